@@ -5,7 +5,7 @@
 
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
 phrase that the glossary replaces, no document above its length. Sources (a folder: all below it): no comment line that begins with Of, What or Where,
-no such phrase in a comment, and sections and equations of a method that its paper has.
+no such phrase in a comment, and sections and equations of a method that its paper has; in public headers no sentence above 35 words.
 """
 import pathlib
 import re
@@ -108,7 +108,26 @@ def paper(name, known={}):
     return known[name]
 
 
+def docstrings(text):
+    """(line, words) of each documenting comment of a header; its listings, indented by four, are left out."""
+    current, start = [], 0
+    for number, line in enumerate(text.splitlines() + [""], 1):
+        found = re.match(r"\s*/// ?(.*)$", line)
+        if found and not current:
+            start = number
+        if found and not found.group(1).startswith("    "):
+            current.append(found.group(1).strip() or "\0")
+        elif current:
+            yield start, " ".join(current)
+            current = []
+
+
 def check_source(path, replaced):
+    if "include" in path.parts and path.suffix == ".hpp":
+        for line, words in docstrings(path.read_text()):
+            for sentence in [s for part in plain(words).split("\0") for s in sentences(part)]:
+                if len(sentence.split()) > LONGEST_SENTENCE:
+                    yield f"{path}:{line}: a sentence of {len(sentence.split())} words: {sentence[:60]}..."
     room = path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else ""
     for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
         if COMMENT.match(line):

@@ -6,11 +6,11 @@
 #include <tether/standard_library.hpp>
 #endif
 
-/// The libraries are compiled with hidden visibility; the declarations between these two lines of
-/// a public header are visible from outside: functions, and classes with all that belongs to them
-/// (vtables and type information, too, so that exceptions are caught by type on the other side).
-/// TETHER_HIDDEN takes an inner class out of that. What templates of Eigen make of them stays
-/// inside: cmake/TetherPrivate.cmake.
+/// The libraries are compiled with hidden visibility. The declarations between these two lines of a
+/// public header are visible from outside: functions, and classes with all that belongs to them.
+/// Vtables and type information are part of that, so that exceptions are caught by type on the
+/// other side. TETHER_HIDDEN takes an inner class out of that. What templates of Eigen make of them
+/// stays inside: cmake/TetherPrivate.cmake.
 #if defined(__GNUC__)
 #define TETHER_EXPORT_BEGIN _Pragma("GCC visibility push(default)")
 #define TETHER_EXPORT_END _Pragma("GCC visibility pop")

@@ -33,6 +33,7 @@ struct PointContact {
 
 class SolverTeam;
 
+/// Settings of BodySolver; illegal values throw where it is made.
 struct BodyOptions {
   Law law = Law::maximum_dissipation;
   /// Wanted Residuals::fixed_point of each contact: the error of its velocity over the largest
@@ -44,7 +45,7 @@ struct BodyOptions {
   int max_sweeps = 200000;
   /// Sweeps before an island of more than 64 contacts may be called solved. The tolerance is
   /// relative to the whole island, so a single contact of many may be off by far more than its
-  /// share; such local errors fade within a few sweeps, errors common to many contacts do not and
+  /// share. Such local errors fade within a few sweeps. Errors common to many contacts do not and
   /// are seen by the tolerance.
   int min_sweeps = 0;
   int threads = 1;         ///< results have the same bits for every number of threads
@@ -71,6 +72,7 @@ struct WarmStart {
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`, N s
 };
 
+/// Impulses (N s) of the contacts, velocities (m/s, rad/s) of the bodies, in the order given.
 struct BodySolution {
   Status status = Status::unsolved;  ///< solved if all islands are, else that of the worst
   double error = Residuals::kNone;   ///< as in BodyOptions::tolerance, of the worst island

@@ -28,7 +28,8 @@ struct Cone {
   };
 
   Kind kind = Kind::free;
-  int rows = 1;
+  int rows = 1;  ///< of x, w and b
+  /// Coefficient of friction; lengths of rolling and torsional friction, m; largest impulse.
   double mu = 0, rolling = 0, torsional = 0, bound = 0;
 
   static Cone free(int rows = 1) { return {Kind::free, rows}; }
@@ -47,6 +48,7 @@ struct Cone {
 
 const char* name(Cone::Kind kind);
 
+/// Entry of a sparse matrix, counted from 0.
 struct MatrixEntry {
   int row = 0, column = 0;
   double value = 0;
@@ -78,6 +80,7 @@ class ConeProblem {
 
   int rows() const { return static_cast<int>(b_.size()); }
   const std::vector<Cone>& cones() const { return cones_; }
+  /// The first of the rows of a cone.
   int first_row(int cone) const { return first_[static_cast<std::size_t>(cone)]; }
   const linalg::VectorX& b() const { return b_; }
   /// With the compliance. Rows ascend, columns ascend in each.
@@ -86,9 +89,9 @@ class ConeProblem {
   linalg::MatrixX dense_matrix() const;
   /// A x - b, sums in long double.
   linalg::VectorX velocities(const linalg::VectorView& impulses) const;
-  /// Factor that makes the velocity of a row comparable with others: 1/sqrt of the mean of the
-  /// diagonal of A over the rows that belong together (normal and tangents; both rolling moments;
-  /// any other row alone). 0 where that is 0.
+  /// Factor that makes the velocity of a row comparable with others. It is 1/sqrt of the mean of
+  /// the diagonal of A over the rows that belong together (normal and tangents; both rolling
+  /// moments; any other row alone). 0 where that is 0.
   const std::vector<double>& row_scale() const { return scale_; }
 
  private:
@@ -112,6 +115,7 @@ struct ConeResiduals {
 /// std::invalid_argument. NaN where an impulse is not finite.
 ConeResiduals evaluate(const ConeProblem& problem, Law law, const linalg::VectorView& impulses);
 
+/// Impulses and velocities by row, and what is known of them.
 struct ConeSolution {
   Status status = Status::unsolved;
   linalg::VectorX impulses, velocities;  ///< x and w = A x - b, by row
@@ -140,6 +144,7 @@ class ConeSolver {
   ConeSolver(ConeSolver&&) noexcept;
   ConeSolver& operator=(ConeSolver&&) noexcept;
 
+  /// Throws std::invalid_argument on a cone that the law does not take, see evaluate().
   ConeSolution solve(const ConeProblem& problem);
   /// Start from the given impulses, by row.
   ConeSolution solve(const ConeProblem& problem, const linalg::VectorView& start);

@@ -15,6 +15,7 @@ namespace detail {
 struct TETHER_HIDDEN DerivativeParts;
 }  // namespace detail
 
+/// Which impulses count as a solution, and which contacts as kinks.
 struct DerivativeOptions {
   /// Largest Residuals::fixed_point of impulses that count as a solution; > 0. Derivatives have
   /// about this relative error, times the condition of the problem.
@@ -37,6 +38,7 @@ enum class DerivativeStatus : std::uint8_t {
 
 const char* name(DerivativeStatus status);
 
+/// A contact near another regime, where only one-sided derivatives exist.
 struct Kink {
   int contact = 0;
   Regime branch = Regime::separating;  ///< whose derivative is given
@@ -44,6 +46,7 @@ struct Kink {
   double margin = 0;                   ///< distance to it over the velocity that the island needs
 };
 
+/// Whether the derivative exists, and of what.
 struct DerivativeReport {
   DerivativeStatus status = DerivativeStatus::unique;
   /// Every contact is strictly open, sticking or sliding: `kinks` is empty. Otherwise the solution
@@ -69,6 +72,7 @@ struct ProblemDirection {
   linalg::VectorX mu, rolling, torsional, bound;  ///< by contact or cone, of those that have one
 };
 
+/// Change of a solution for a change of its problem.
 struct SolutionDirection {
   linalg::VectorX impulses, velocities;  ///< dx and dw = A dx + dA x - db, by row
   /// |M y - r| / |r| of the equations solved. Not small: the direction leaves the range of a
@@ -77,20 +81,20 @@ struct SolutionDirection {
 };
 
 /// J v and J' v of the solution x, w of a problem by implicit differentiation on the branch of the
-/// present regimes: dx = 0 (open), dw = 0 (sticking), and dw_n = 0, |x_t| = mu x_n and the law's
-/// direction of slip (sliding), in scaled units one sparse matrix
+/// present regimes. These are dx = 0 (open), dw = 0 (sticking), and dw_n = 0, |x_t| = mu x_n and
+/// the law's direction of slip (sliding), in scaled units one sparse matrix
 ///
 ///     M y = r,   M = P + Q A     (method, eq. 30)
 ///
-/// that is factored once, each island by itself: complete orthogonal decomposition up to 100
-/// touching contacts, sparse LU beyond; where that is singular the former up to 400, then sparse
-/// minimum-norm factors (of M' apart, once adjoint() asks). Over cones those of the contacts that
-/// stand for them, and of the free rows by theirs. Not for use by two threads at once.
+/// that is factored once, each island by itself. Up to 100 touching contacts it is a complete
+/// orthogonal decomposition, beyond a sparse LU. Where that is singular the former up to 400, then
+/// sparse minimum-norm factors (of M' apart, once adjoint() asks). Over cones those of the contacts
+/// that stand for them, and of the free rows by theirs. Not for use by two threads at once.
 class Derivative {
  public:
   /// Over cones, contacts in it are blocks of the problem (`regimes`: one for each, of free ones
-  /// sticking, of bounded ones sticking or sliding), one with moments may stand in a list several
-  /// times; unknowns and rank count components of the contacts that stand for the cones.
+  /// sticking, of bounded ones sticking or sliding). One with moments may stand in a list several
+  /// times. Unknowns and rank count components of the contacts that stand for the cones.
   const DerivativeReport& report() const;
   const linalg::VectorX& impulses() const;  ///< the solution itself
 

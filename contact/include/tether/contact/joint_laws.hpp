@@ -21,6 +21,7 @@ namespace tether::contact {
 /// end of the step: stable for any step and gain.
 class JointLaws {
  public:
+  /// A law as it was added.
   struct Law {
     int joint;           ///< number, for messages
     bool limit;          ///< else bounded

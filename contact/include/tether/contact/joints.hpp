@@ -16,6 +16,7 @@ namespace tether::contact {
 /// The impulse acts on that body as G' x. Keeps its storage when it is filled anew.
 class JointRows {
  public:
+  /// The part of one body in a row.
   struct Term {
     int body;
     Vector6d G;

@@ -29,10 +29,10 @@ const char* name(Regime regime);
 /// Every law, in the order of its enumerators: what readers and command lines offer by name().
 const std::vector<Law>& laws();
 
-/// Factors of one symmetric 3x3 block A = [a c'; c T] and its friction coefficient, in the frame in
-/// which B = T - c c'/a is diagonal: B = V diag(beta) V', g = V' mu c / a, e = |g| (eccentricity of
-/// the conic section). beta is kept >= 1e-12 trace(A), which makes singular blocks solvable; a null
-/// direction is marked.
+/// Factors of one symmetric 3x3 block A = [a c'; c T] and its friction coefficient (method, eq. 7).
+/// In the frame V the matrix B = T - c c'/a is diag(beta). There g = V' mu c / a, and e = |g| is
+/// the eccentricity of the conic section. beta is kept >= 1e-12 trace(A), which makes singular
+/// blocks solvable. A null direction is marked.
 struct LocalBlock {
   double a, inv_a, mu, e;
   double c[2], g[2], beta[2], cosine, sine;
@@ -61,6 +61,7 @@ struct LocalState {
 /// Exact solution of the one-contact problem with right-hand side b, warm-started from `state`.
 void solve_local(Law law, const LocalBlock& block, const Eigen::Vector3d& b, LocalState& state);
 
+/// Impulse (normal, tangent, tangent) of one contact, and its regime.
 struct OneContact {
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();
   Regime regime = Regime::separating;

@@ -21,6 +21,7 @@ struct BodyForm;
 using linalg::PackedBlock;
 using linalg::PackedVector;
 
+/// 3 x 3 block of A between two contacts, counted from 0; 1/kg.
 struct MatrixBlock {
   int row = 0, column = 0;
   Eigen::Matrix3d value = Eigen::Matrix3d::Zero();  ///< planar: the upper left 2x2 part counts
@@ -43,7 +44,7 @@ class Problem {
                         const linalg::VectorView& mu);
 
   int contacts() const { return static_cast<int>(local_.size()); }
-  int dimension() const { return dimension_; }
+  int dimension() const { return dimension_; }  ///< 3, or 2 in the plane
   const linalg::VectorX& b() const { return b_; }
   double mu(int contact) const { return local_[static_cast<std::size_t>(contact)].mu; }
   const LocalBlock& local(int contact) const { return local_[static_cast<std::size_t>(contact)]; }
@@ -67,6 +68,7 @@ class Problem {
   const detail::BodyForm* body_form() const { return body_form_.get(); }
   void set_body_form(std::shared_ptr<const detail::BodyForm> form) { body_form_ = std::move(form); }
 
+  /// dimension * contacts entries as one padded vector a contact, and back.
   std::vector<PackedVector> pack(const linalg::VectorView& x) const;
   void unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const;
 

@@ -34,7 +34,7 @@ class RankMessages {
 };
 
 /// Processes that all have the same bodies and contacts, as a team for BodyOptions::team and
-/// SteppingOptions::team: each sweeps the contacts of its part of the bodies, colour by colour, and
+/// SteppingOptions::team. Each sweeps the contacts of its part of the bodies, colour by colour, and
 /// all know the whole result then. Bits are those of one process. Every process makes the same
 /// calls; what one cannot do all throw.
 class RankTeam final : public SolverTeam {

@@ -42,6 +42,9 @@ struct Shape {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   linalg::Quaternion orientation = linalg::Quaternion::Identity();
 
+  /// Lengths in m, > 0, here and below; a Stepper refuses others. The normal leads out of the solid
+  /// half space; sizes of boxes are full edges. A capsule's length is between the centres of its
+  /// caps, along z. A convex shape is the hull of its vertices.
   static Shape sphere(double radius);
   static Shape plane(const Eigen::Vector3d& normal);
   static Shape box(const Eigen::Vector3d& size);
@@ -57,6 +60,7 @@ struct Shape {
   /// The mesh of heights[k nx + i] above (i dx, k dy): at least two in each direction. Throws
   /// std::invalid_argument unless nx divides their number.
   static Shape height_field(const std::vector<double>& heights, int nx, double dx, double dy);
+  /// Points that touch other shapes, but neither meshes nor each other.
   static Shape touching_points(std::vector<Eigen::Vector3d> points);
 };
 

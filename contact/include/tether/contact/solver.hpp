@@ -32,6 +32,7 @@ enum class Status : std::uint8_t {
 const char* name(Measure measure);
 const char* name(Status status);
 
+/// Settings of Solver and ConeSolver; illegal values throw where these are made.
 struct Options {
   Law law = Law::maximum_dissipation;
   double tolerance = 1e-9;  ///< measure <= tolerance ends the solve; > 0
@@ -46,6 +47,7 @@ struct Options {
   double enough = 0;
 };
 
+/// Work of a solve.
 struct Counts {
   int sweeps = 0, factorisations = 0;
   double work = 0;  ///< estimated nanoseconds
@@ -57,6 +59,7 @@ struct Counts {
   }
 };
 
+/// Impulses (N s), velocities (m/s) and what is known of them; entries by contact, then component.
 struct Solution {
   Status status = Status::unsolved;
   linalg::VectorX impulses, velocities;  ///< x and w = A x - b
@@ -79,6 +82,7 @@ class Solver {
   Solver(Solver&&) noexcept;
   Solver& operator=(Solver&&) noexcept;
 
+  /// A problem that cannot be solved is a status with advice, not an exception.
   Solution solve(const Problem& problem);
   /// Start from the given impulses (dimension * contacts entries).
   Solution solve(const Problem& problem, const linalg::VectorView& start);

@@ -71,6 +71,7 @@ struct BodySet {
           const linalg::Quaternion& turned = linalg::Quaternion::Identity(),
           const Eigen::Vector3d& velocity = Eigen::Vector3d::Zero(),
           const Eigen::Vector3d& angular_velocity = Eigen::Vector3d::Zero());
+  /// A body that does not move; returns its index.
   int add_fixed(const Eigen::Vector3d& at,
                 const linalg::Quaternion& turned = linalg::Quaternion::Identity());
 };
@@ -101,12 +102,13 @@ struct Meeting {
 /// Velocities changed by forces during a step of length dt that starts at `time`.
 using Force = std::function<void(BodySet& bodies, double time, double dt)>;
 
+/// Settings of Stepper; illegal values throw where it is made.
 struct SteppingOptions {
   double step = 1e-3;  ///< dt, s
-  /// > 0: each step is taken in parts whose error is at most this, of positions relative to the
-  /// size of each body (reach of its surfaces, or radius of gyration), of rotations in rad, and of
-  /// smooth velocities by what they move a body in the part; at most 0.1. See method, section 7.
-  /// 0: in one.
+  /// > 0: each step is taken in sub-steps whose error is at most this; at most 0.1. Positions count
+  /// relative to the size of each body (reach of its surfaces, or radius of gyration), rotations in
+  /// rad, and smooth velocities by what they move a body in the sub-step. See method, section 7. 0:
+  /// in one.
   double accuracy = 0;
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: not evaluated
   Law law = Law::coulomb;
@@ -118,10 +120,10 @@ struct SteppingOptions {
   /// accepted.
   double acceptance = 1;
   /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,
-  /// and so on, at most this many times. The shortest parts, and parts with an impact (which a
-  /// shorter step does not make easier), accept residuals up to 1e-4 at least, after five times
-  /// max_work where needed, and if acceptance > 1 up to 1e-3 then. A shortest part above that is
-  /// used all the same and counted as `unsolved`. 0: no halving.
+  /// and so on, at most this many times. The shortest sub-steps, and those with an impact (which a
+  /// shorter step does not make easier), accept residuals up to 1e-4 at least. They do so after
+  /// five times max_work where needed, and if acceptance > 1 up to 1e-3 then. A shortest part above
+  /// that is used all the same and counted as `unsolved`. 0: no halving.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;
   /// A penetration of depth d is reduced at the speed min(error_reduction d / dt,
@@ -137,16 +139,17 @@ struct SteppingOptions {
   /// Approaches faster than this times sqrt(g s) that would close within the step get their whole
   /// impulse at the present gap; slower ones close the gap first (bias gap / dt).
   double impact_threshold = 0.01;
-  /// Steps are taken up to where a gap closes, the impact, and the rest, and bodies that nothing
-  /// but their weight acts upon fall along their parabola: errors go with the step and not with the
-  /// phase of impacts in it (method, section 7). With more than 16 contacts, up to 512, only at
-  /// impacts in islands of at most 16, for a tenth more problems at most. Islands in which joints
-  /// have laws or pairs rolling friction are not cut; an accuracy has this of its own.
+  /// Steps are taken up to where a gap closes, the impact, and the rest. Bodies that nothing but
+  /// their weight acts upon fall along their parabola. The position error is O(dt); without this it
+  /// also depends on where in the step the impact falls (method, section 7). With more than 16
+  /// contacts, up to 512, only at impacts in islands of at most 16, for a tenth more problems at
+  /// most. Islands in which joints have laws or pairs rolling friction are not cut; an accuracy has
+  /// this of its own.
   bool cut_at_impacts = true;
   /// in_turn: only with cut_at_impacts, without an accuracy, and in islands that are cut.
   SimultaneousImpacts simultaneous_impacts = SimultaneousImpacts::together;
   /// > 0: islands of bodies that have been slower than this times sqrt(g s) for 5 sqrt(s / g) fall
-  /// asleep: they take part in no problem until something touches them, the forces on them change
+  /// asleep. They take part in no problem until something touches them, the forces on them change
   /// or what they lie on moves (method, section 7). Needs gravity; not with an accuracy or rolling
   /// friction. 0: none does.
   double sleep = 0;
@@ -183,6 +186,7 @@ constexpr std::uint64_t contact_id(int first_surface, int second_surface, int fe
          (static_cast<std::uint64_t>(second_surface) << 16) | static_cast<std::uint64_t>(feature);
 }
 
+/// Work since the start.
 struct StepCounts {
   long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0, bounces = 0;
   long accepted = 0;  ///< problems above the tolerance that were accepted
@@ -221,7 +225,7 @@ struct StepperMemory {
     std::vector<Vector6d> mode;
   } vibration;
   double cuts = 0;  ///< that may still be made where there are many contacts, in problems
-  /// State of a body where any may sleep: how long it has been slow, s; its island, -1: awake;
+  /// State of a body where any may sleep: how long it has been slow, s; its island, -1: awake. Then
   /// whether it fell asleep in this sub-step; accelerations by forces, as of now or of the sleep.
   struct Rest {
     double slow = 0;
@@ -244,6 +248,7 @@ struct StepperMemory {
   } sleep;
 };
 
+/// Time spent on one effect since the start, s.
 struct StageCost {
   const char* effect;
   double seconds;
@@ -279,6 +284,8 @@ class Stepper {
   /// or more connects pass through each other.
   void add_joints(std::unique_ptr<JointEquations> joints);
 
+  /// One step of SteppingOptions::step; succeeded() then tells how it went. Throws
+  /// std::invalid_argument where joints contradict each other.
   void step();
 
   double time() const;  ///< steps * dt; where a start was late, that until its step is taken

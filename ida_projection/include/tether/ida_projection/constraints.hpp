@@ -73,13 +73,12 @@ struct DenseJacobian {
 };
 
 /// Many rows with few entries each: C by its entries. The pattern is fixed and lists every entry
-/// that can ever differ from zero (a velocity that is zero at the start included), in compressed
-/// rows: entries starts[i] .. starts[i + 1] - 1 belong to row i, in the ascending columns
+/// that can ever differ from zero (a velocity that is zero at the start included). Rows are
+/// compressed: entries starts[i] .. starts[i + 1] - 1 belong to row i, in the ascending columns
 /// `columns[..]`. `fill` writes their values in the same order; they are zero on entry. Joined
-/// dense rows (energy) stay full rows, of which there should be few. Up to 128 rows in all, with
-/// m N <= 65536, take the factors of dense rows: the run is that of the same rows as a
-/// DenseJacobian, bit for bit. More rows take sparse factors, and agree with dense ones to the
-/// tolerance.
+/// dense rows (energy) stay full rows, of which there should be few. Up to 128 rows in all, with m
+/// N <= 65536, take the factors of dense rows: the run is that of the same rows as a DenseJacobian,
+/// bit for bit. More rows take sparse factors, and agree with dense ones to the tolerance.
 struct SparseJacobian {
   std::vector<int> starts;   ///< count + 1, from 0 to the number of entries
   std::vector<int> columns;  ///< of each entry
@@ -101,7 +100,7 @@ struct Gradients {
 /// row belongs to one process, whose Constraints::count, `value`, names and messages are about its
 /// own rows. A row may contain unknowns of other processes, of which this one has copies, the
 /// ghosts: `value` and `fill` get y with this process's unknowns first and its ghosts after them.
-/// Every process calls the functions of its ghosts equally often, and in the same order; a failure
+/// Every process calls the functions of its ghosts equally often, and in the same order. A failure
 /// of one is a failure on all. mpi_rows.hpp makes everything but `value` and `fill` from the global
 /// numbers of the columns.
 struct DistributedRows {
@@ -117,9 +116,9 @@ struct DistributedRows {
   Callable<ConstVector, Vector> add_ghosts;
 };
 
-/// The projection done by the caller, in the shape of CVODE's CVProjFn: from y at time t compute
+/// The projection done by the caller, in the shape of CVODE's CVProjFn. From y at time t compute
 /// corr with y + corr on the constraints, to accuracy eps_proj in the WRMS norm of IDA's error
-/// weights. err holds a copy of the corrector's accumulated correction; IDA uses the projected
+/// weights. err holds a copy of the corrector's accumulated correction. IDA uses the projected
 /// correction for its error test, so whatever is written to err is ignored.
 struct UserProjection {
   using Function = int (*)(sunrealtype t, N_Vector y, N_Vector corr, sunrealtype eps_proj,
@@ -171,11 +170,10 @@ struct JacobianReport {
 };
 
 /// Compares the caller's Jacobian with extrapolated central differences at (t, y), entry by entry.
-/// Works for DenseJacobian and SparseJacobian (an entry that the pattern lacks is wrong, too, and
-/// so is a g or C of fill_with_value that differs from those of the functions for one of them);
-/// FiniteDifferences pass trivially. An entry is wrong when it differs by
-/// more than `tolerance` times the larger of its own size and its row's largest entry, both in
-/// the scale max(|y_j|, 1).
+/// Works for DenseJacobian and SparseJacobian; FiniteDifferences pass trivially. An entry that the
+/// pattern lacks is wrong, too, and so is a g or C of fill_with_value that differs from those of
+/// the functions for one of them. An entry is wrong when it differs by more than `tolerance` times
+/// the larger of its own size and its row's largest entry, both in the scale max(|y_j|, 1).
 JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
                               double tolerance = 1e-5);
 JacobianReport check_jacobian(const Constraints& constraints, double t,

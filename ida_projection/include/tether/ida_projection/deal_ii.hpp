@@ -132,8 +132,8 @@ class Hooks {
 
 }  // namespace detail
 
-/// Instead of ida.solve_dae(solution, solution_dot), with every step on the rows, and every output,
-/// which IDA interpolates, moved onto them before ida.output_step sees it (solution alone:
+/// Instead of ida.solve_dae(solution, solution_dot): every step is on the rows. Every output, which
+/// IDA interpolates, is moved onto them before ida.output_step sees it (solution alone:
 /// solution_dot stays IDA's; after a restart, both are as the restart left them). Attached anew
 /// after each restart. Hooks of `ida` must be set before. Throws std::invalid_argument for rows
 /// that cannot be attached, std::runtime_error where IDA fails or an output cannot be moved onto

@@ -19,12 +19,11 @@ enum class Metric {
   /// D_i = WT_i, the weights of the error test (Hanson and Krogh).
   error_weights,
   /// local_correction, but error_weights where the linear solver is iterative and the rows are
-  /// Gradients or at most a 16th of the unknowns, as the invariants of a field: s has a kink
-  /// wherever the correction changes its sign along a grid, the move then has rough parts, and they
+  /// Gradients or at most a 16th of the unknowns, as the invariants of a field. There s has a kink
+  /// wherever the correction changes its sign along a grid. The move then has rough parts, which
   /// take a Krylov method the most iterations. With a direct solver and more than 16 rows: one
-  /// scale
-  /// for all unknowns of a kind (positions, velocities), as Options::group has it, where stiff
-  /// components answer less to such moves, and moves that they take part in as F has it.
+  /// scale for all unknowns of a kind (positions, velocities), as Options::group has it, where the
+  /// response of stiff components to such moves is smaller.
   automatic,
 };
 
@@ -74,9 +73,9 @@ struct Advanced {
   Polished polish = Polished::all;
 
   /// Begin Options::step_smoothing during the run where IDA's own rule is known to harm: F is not
-  /// of index 1 in its own variables (tested once in serial vectors; above 200 unknowns by
-  /// equations of F that contain neither y' nor algebraic variables), or ten steps in a row had a
-  /// failed error test. IDASetMaxStep is not used then.
+  /// of index 1 in its own variables, or ten steps in a row had a failed error test. The index is
+  /// tested once, in serial vectors; above 200 unknowns by equations of F that contain neither y'
+  /// nor algebraic variables. IDASetMaxStep is not used then.
   bool smooth_where_needed = true;
   /// Limits for step_smoothing, which owns IDASetMaxStep: the longest step (0: none), and
   /// IDASetMaxOrd's order, if it was called.
@@ -97,8 +96,8 @@ struct Advanced {
 /// Settings of the projection.
 struct Options {
   /// IDA's id vector: 1 differential, 0 algebraic. Copied at attach. Null: derived at the first
-  /// step from the columns of dF/dy' that are exactly zero (contiguous vectors), with about
-  /// 2 log2(N) evaluations of F for each derivative in an equation, 8000 at most;
+  /// step from the columns of dF/dy' that are exactly zero (contiguous vectors). That takes about 2
+  /// log2(N) evaluations of F for each derivative in an equation, 8000 at most.
   /// Projection::message() tells when it cannot be derived.
   N_Vector id = nullptr;
 

@@ -79,13 +79,13 @@ struct Consistency {
   std::vector<bool> hold;  ///< components of y to leave as they are (in addition to Options::hold)
 };
 
-/// Constraint projection inside IDA: decorates IDA's nonlinear solver, so that every candidate
-/// y = ypred + ycor is moved onto g(t, y) = 0 before IDA tests its error and accepts it
-/// (Hanson and Krogh). The object must live until IDAFree or the last IDASolve, whichever is first;
-/// IDASolve without it fails (IDA_NLS_FAIL, before the first step IDA_NLS_INIT_FAIL).
-/// A nonlinear solver that the host attaches later replaces it silently. status(), message(),
-/// statistics(), IDAFree and the destructor therefore compare IDA's steps with the calls that the
-/// plugin has had; a difference is printed once to stderr (Options::print).
+/// Constraint projection inside IDA: decorates IDA's nonlinear solver, so that every candidate y =
+/// ypred + ycor is moved onto g(t, y) = 0 before IDA tests its error and accepts it (Hanson and
+/// Krogh). The object must live until IDAFree or the last IDASolve, whichever is first; IDASolve
+/// without it fails (IDA_NLS_FAIL, before the first step IDA_NLS_INIT_FAIL). A nonlinear solver
+/// that the host attaches later replaces it silently. status(), message(), statistics(), IDAFree
+/// and the destructor therefore compare IDA's steps with the calls that the plugin has had. A
+/// difference is printed once to stderr (Options::print).
 ///
 /// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
 ///
@@ -127,19 +127,19 @@ class [[nodiscard]] Projection {
   /// See <tether/ida_projection/sensitivities.hpp>, whose function of this name is to be called.
   void project_sensitivities(Sensitivities sensitivities, const tether_idas_functions& idas);
 
-  /// Initial sensitivities (as many as Sensitivities::count, after project_sensitivities) onto
-  /// C s_k + dg/dp_k = 0, sp (may be null) onto the derivative of that along (y, y'), each by its
-  /// shortest change in the error weights. Hand the result to IDASensReInit; IDACalcIC may follow.
-  /// y, y' on the constraints. On failure s and sp are unchanged.
+  /// Initial sensitivities (as many as Sensitivities::count, after project_sensitivities) onto C
+  /// s_k + dg/dp_k = 0. Likewise sp (may be null) onto the derivative of that along (y, y'), each
+  /// by its shortest change in the error weights. Hand the result to IDASensReInit; IDACalcIC may
+  /// follow. y, y' on the constraints. On failure s and sp are unchanged.
   ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
                                                   N_Vector* sp);
 
-  /// For adjoint problems: the gradient of a function of y, of which only its part along the
-  /// constraints matters, without that across them: v <- v - C^T (C C^T)^+ C v with C at (t, y). On
-  /// failure v is unchanged. Needs no sensitivities; std::invalid_argument for a UserProjection.
+  /// For adjoint problems: the gradient of a function of y, without its part across the
+  /// constraints. v <- v - C^T (C C^T)^+ C v with C at (t, y). On failure v is unchanged. Needs no
+  /// sensitivities; std::invalid_argument for a UserProjection.
   ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
 
-  Statistics statistics() const;
+  Statistics statistics() const;  ///< since the start, or the last reset
   void reset_statistics();
   Status status() const;               ///< of the last call by IDA, or of the last call above
   const std::string& message() const;  ///< what to do about it; empty when all is well

@@ -8,7 +8,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-/// Anderson's acceleration of x = G(x), type II: with g = G(x) and the (weighted) residual f of x,
+/// Anderson's acceleration of x = G(x), type II. With g = G(x) and the (weighted) residual f of x,
 /// the next point is g - sum gamma_k dg_k, gamma = argmin |f - sum gamma_k df_k| over the last
 /// `depth` differences. The Gram matrix is kept, so that a step costs 2 depth dots and depth axpys.
 class Anderson {

@@ -15,9 +15,9 @@ struct BlockPivot {
   int order[3];
 };
 
-/// L U of 3x3 blocks: unsymmetric values on a symmetric pattern, pivots are the diagonal blocks in
+/// L U of 3x3 blocks: unsymmetric values on a symmetric pattern. Pivots are the diagonal blocks in
 /// approximate minimum-degree order (elimination.hpp). order() once for a pattern, analyse() for
-/// each set of active rows, then every row: begin_row, add for each of its blocks, end_row.
+/// each set of active rows. Then every row: begin_row, add for each of its blocks, end_row.
 class BlockLu {
  public:
   void order(const BlockPattern& pattern);

@@ -8,10 +8,10 @@
 
 namespace tether::linalg {
 
-/// Eigen aligns to the widest vector register that the compiler may use: -mavx turns the alignment
+/// Eigen aligns to the widest vector register that the compiler may use. -mavx turns the alignment
 /// of Eigen::Quaterniond, of fixed matrices of 32 bytes and of everything on the heap from 16 into
-/// 32 bytes, and with it the layout of structures and the way in which memory is freed. A program
-/// and a library compiled with different flags must not own such objects together.
+/// 32 bytes. With it change the layout of structures and the way in which memory is freed. A
+/// program and a library compiled with different flags must not own such objects together.
 ///
 /// Public headers therefore hold these types. They are not aligned (Eigen::DontAlign: memory from
 /// malloc, whatever the flags), convert from and to Eigen's own types, and are as fast where

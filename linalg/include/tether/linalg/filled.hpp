@@ -27,7 +27,7 @@ void visit_filled(const double* c, int n, Visit visit) {
     if (c[j] != 0.0) visit(j, c[j]);
 }
 
-/// The columns of each row of an array in which anything but a zero was ever seen: arrays that are
+/// The columns of each row of an array in which anything but a zero was ever seen. Arrays that are
 /// handed over whole mostly hold few entries, in the same places each time. resize() allocates,
 /// nothing else does.
 class FilledPlaces {

@@ -8,8 +8,9 @@
 TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-/// The shortest x of min |A x - b|, A of any shape and rank: the complete orthogonal decomposition
-/// A P = Q (T 0; 0 0) Z (Golub and Van Loan, Matrix Computations, 5.5.2) of Eigen, compiled once.
+/// The shortest x of min |A x - b|, A of any shape and rank. By the complete orthogonal
+/// decomposition A P = Q (T 0; 0 0) Z (Golub and Van Loan, Matrix Computations, 5.5.2) of Eigen,
+/// compiled once.
 class LeastSquares {
  public:
   /// Pivots up to `threshold` times the largest count as zero; 0: rounding alone does.

@@ -66,10 +66,10 @@ class MinimumNorm {
               double rank_tolerance, const FilledPlaces* places = nullptr);
 
   /// The same with the rows that the last factor() and use_rank() let take part, in their order,
-  /// from A A^T of these alone: some tenth of the work, less where rows have few entries, and up to
-  /// 16 x 32 half of it, without the chain of one pivot after the other. False: an entry is not
-  /// finite, a row depends on those before it but for a sine below 1e-3 or a third of what factor()
-  /// found least, or a small system has dropped rows: then factor() is due.
+  /// from A A^T of these alone. It takes some tenth of the work, less where rows have few entries,
+  /// and up to 16 x 32 half of it, without the chain of one pivot after the other. False: an entry
+  /// is not finite, a row depends on those before it but for a sine below 1e-3 or a third of what
+  /// factor() found least. Also where a small system has dropped rows. Then factor() is due.
   bool factor_kept(const double* wide, int width, const int* rows, const int* columns,
                    const FilledPlaces* places = nullptr);
 
@@ -88,7 +88,7 @@ class MinimumNorm {
   int dropped() const { return m_ - rank_; }
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const;
-  /// |R_kk|, k < rank(): how much of a unit row is independent of those before it; from factor() no
+  /// |R_kk|, k < rank(): how much of a unit row is independent of those before it. From factor() no
   /// larger than the one before, but for those of at least 1e-3 where A A^T has found them.
   double independent_part(int k) const;
   /// The square of the smallest one that factor() has kept; 1 for rank 0.

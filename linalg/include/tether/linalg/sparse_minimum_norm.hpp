@@ -9,10 +9,10 @@
 TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-/// The same as MinimumNorm, min sum_j (dy_j / D_j)^2 subject to C dy = g, for an m x n matrix C
+/// The same as MinimumNorm, min sum_j (dy_j / D_j)^2 subject to C dy = g. C is an m x n matrix
 /// whose first rows are sparse with a fixed pattern and whose last `full` rows are dense.
 ///
-/// With A = S C D, S = diag(1 / |row_i(C D)|), b = S g and M = A A^T + eps I = L diag(d) L^T (L
+/// Let A = S C D, S = diag(1 / |row_i(C D)|) and b = S g. With M = A A^T + eps I = L diag(d) L^T (L
 /// sparse, approximate minimum degree, analysed once; full rows as a border) the steps
 ///
 ///     du <- du + A^T M^-1 (b - A du)
@@ -56,7 +56,7 @@ class SparseMinimumNorm {
   double* metric();
 
   /// eps = rank_tolerance^2, at least 1e-13, which rounding of A A^T needs. Coefficients c of a row
-  /// over those before it make eps |c|^2 of a dependent one's d_k; they are looked at where d_k is
+  /// over those before it make eps |c|^2 of a dependent one's d_k. They are examined where d_k is
   /// below `thin` (0 to 1), first over the nearest rows alone, then of all by eight random vectors.
   /// False if C D has an entry that is not finite; the factors are then unusable.
   bool factor(double rank_tolerance = 1e-6, double thin = 1e-6);
@@ -64,14 +64,14 @@ class SparseMinimumNorm {
   /// |b - A du| <= tolerance |b| + 4e-16 |du|; residual() is the value reached.
   void solve(const double* g, double* dy, double tolerance = kTolerance);
 
-  /// The first of solve()'s steps alone, dy = D A^T M^-1 b: D^-1 dy is symmetric in u for b = A u,
+  /// The first of solve()'s steps alone, dy = D A^T M^-1 b. D^-1 dy is symmetric in u for b = A u,
   /// whatever rounding decides, and short of the least norm by eps / (s^2 + eps). Leaves residual()
   /// and iterations() as they are.
   void one_step(const double* g, double* dy);
 
-  /// The least x (m entries, each measured in the inverse unit of its row's |row_i(C D)|) with
-  /// D^2 C^T x = dy, for dy from solve(), or a sum of such: the multipliers of the rows. Of a row
-  /// that is given k times each copy gets a k-th. Does not allocate, leaves residual() as it is.
+  /// The multipliers of the rows (m entries): the least x with D^2 C^T x = dy, for dy from solve(),
+  /// or a sum of such. Entries are measured in the inverse unit of |row_i(C D)|. Of a row that is
+  /// given k times each copy gets a k-th. Does not allocate, leaves residual() as it is.
   void multipliers(const double* dy, double* x);
 
   int rank() const { return rows() - dropped(); }

@@ -24,8 +24,8 @@ struct CostRow {
   CostMethod method = CostMethod::smooth;
   double setting = 0;
   /// Bound on the error: the largest distance of a body's centre (m) and angle of its orientation
-  /// (rad) from the reference, whichever is larger, over the times below and all bodies, and what
-  /// the reference may be off.
+  /// (rad) from the reference, over the times below and all bodies. It includes what the reference
+  /// may be off.
   double error = 0;
   double seconds = 0;  ///< processor time of the engine, the least of several runs
   double drift = 0, penetration = 0;
@@ -35,6 +35,7 @@ struct CostRow {
   std::string failure;  ///< empty: it reached the end
 };
 
+/// Settings of a comparison; empty ones have defaults.
 struct CostOptions {
   /// Settings of each method. All empty: a range for each method that can run the scene; with
   /// contact: events, where that engine has the scene, steps, and steps with an accuracy.
@@ -51,6 +52,7 @@ struct CostOptions {
   std::function<bool()> interrupted;
 };
 
+/// Error and time of each setting.
 struct CostTable {
   bool smooth = true;  ///< the plan's engine takes tolerances
   std::string

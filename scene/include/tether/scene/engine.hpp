@@ -30,6 +30,7 @@ struct BodyState {
   }
 };
 
+/// A contact at Engine::time(), world axes; indices as Scene::bodies.
 struct ContactState {
   int first = -1, second = -1;
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
@@ -46,13 +47,14 @@ struct ContactState {
 struct JointForce {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< N
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< about the joint's point `at`, N m
-  /// The part along the joint's own coordinate, positive where it increases it: hinge, the moment
+  /// The part along the joint's own coordinate, positive where it increases it. Hinge, the moment
   /// about the axis, N m; slider, the force along the axis, N; distance, the force that pushes the
   /// points apart, N. Hinges and sliders have it by motions, motors, limits and friction.
   double drive = 0;
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< the point, m
 };
 
+/// Force of a spring and its damper.
 struct SpringForce {
   double tension = 0;  ///< > 0: pulls its ends together, N
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();  ///< ends, m
@@ -94,6 +96,7 @@ struct ContactEvent {
 };
 const char* name(ContactEvent::Kind kind);
 
+/// Conserved quantities and errors at Engine::time(), SI.
 struct Diagnostics {
   double kinetic_energy = 0, potential_energy = 0;  ///< J; potential: gravity and springs
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
@@ -103,6 +106,7 @@ struct Diagnostics {
   double residual = 0;     ///< of the last contact problem
 };
 
+/// Work of an engine since the start.
 struct Counts {
   long steps = 0, residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
   long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
@@ -139,11 +143,11 @@ class Engine {
  public:
   virtual ~Engine() = default;
   virtual const char* name() const = 0;
-  virtual double time() const = 0;
+  virtual double time() const = 0;  ///< s
   /// Moves to time t >= time(); stepping ends at the first step boundary not before t (to
   /// round-off). Throws SimulationError.
   virtual void advance(double t) = 0;
-  virtual const std::vector<BodyState>& bodies() const = 0;
+  virtual const std::vector<BodyState>& bodies() const = 0;  ///< as Scene::bodies
   virtual Diagnostics diagnostics() const = 0;
   virtual const std::vector<ContactState>& contacts() const = 0;
   /// Forces::joints and Forces::springs; see total_forces(). Throws SimulationError in an engine

@@ -36,7 +36,7 @@ struct JointMotor {
   bool has_gains() const { return stiffness > 0 || damping > 0; }
 };
 
-/// The force -stiffness (s - rest) - damping s' along the angle or way s of a hinge or slider; the
+/// The force -stiffness (s - rest) - damping s' along the angle or way s of a hinge or slider. The
 /// moment -stiffness turn - damping (angular velocity) of a ball, whose rest is that of t = 0.
 struct JointSpring {
   double stiffness = 0, damping = 0;  ///< N m/rad, N m s/rad; N/m, N s/m
@@ -47,7 +47,7 @@ struct JointSpring {
   std::vector<std::array<double, 2>> stiffness_table = {}, damping_table = {};
 };
 
-/// Couples the angles and ways s of hinges and sliders, which are 0 at t = 0: the sum of weight s
+/// Couples the angles and ways s of hinges and sliders, which are 0 at t = 0. The sum of weight s
 /// is 0, or, of two joints, s_1 = polynomial(s_2), coefficients from degree 1 on.
 struct Coupling {
   std::string name;

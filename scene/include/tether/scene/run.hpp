@@ -39,6 +39,7 @@ struct Processes {
   std::function<void()> meet;  ///< waits until all have called it
 };
 
+/// Start, observers and processes of a run.
 struct RunOptions {
   std::string restart;  ///< a saved state to go on from; empty: from t = 0
   /// The state may be of another scene or version, and files that Tether did not write are
@@ -56,6 +57,7 @@ struct RunOptions {
   Processes among;  ///< with a team
 };
 
+/// Outcome of a run.
 struct RunResult {
   std::string engine;
   double time = 0;                           ///< s, reached
@@ -83,8 +85,8 @@ constexpr double kMostRecords = 1e7;  ///< end / every, end / checkpoint
 
 /// Runs the scene to its end and writes what Scene::output names. Throws std::invalid_argument for
 /// times out of range, names that collide, files that Tether did not write and a scene that no
-/// engine has, std::runtime_error for files, also those that another run writes at the time; a run
-/// that cannot go on is a result.
+/// engine has. Throws std::runtime_error for files, also those that another run writes at the time.
+/// A run that cannot go on is a result.
 ///
 /// With its state saved, a run is continued bit by bit: RunOptions::restart leaves the rows, frames
 /// and states that a run in one piece would have left.

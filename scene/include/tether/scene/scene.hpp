@@ -25,6 +25,7 @@ using contact::RestitutionLaw;
 using contact::Shape;
 using contact::ShapeKind;
 
+/// Resistance of a medium at rest.
 struct Drag {
   /// Force -(linear + quadratic |v|) v, v against the wind: N s/m, N s^2/m^2.
   double linear = 0, quadratic = 0;
@@ -108,6 +109,7 @@ struct CentralGravity {
 
 enum class InvariantKind : std::uint8_t { energy, momentum, angular_momentum };
 
+/// A quantity that a smooth scene keeps.
 struct Invariant {
   InvariantKind kind = InvariantKind::energy;
   bool project = true;  ///< false: only recorded
@@ -155,6 +157,7 @@ struct EventOptions {
 /// The engine that a scene asks for; `automatic` leaves it to the plan.
 enum class EngineChoice : std::uint8_t { automatic, smooth, stepping, event };
 
+/// Files that a run writes.
 struct Output {
   /// Names of files by their formats: csv, vtk, svg, state; empty: not written.
   std::map<std::string, std::string, std::less<>> files;
@@ -226,10 +229,11 @@ constexpr bool is_force(Quantity q) {
 }
 
 /// The scene as its own test: |quantity(time) - value| <= within in every component (orientation:
-/// wxyz, of either sign), and `at_most` / `at_least` bound the number itself or the norm of a
-/// vector. distance_moved is |x(time) - x(0)|, energy_change E(time) - E(0); contact_force the sum
-/// over the contacts of the body, contact_slip the largest |slip| of those with a force, both of
-/// those with the body `against` where one is named; joint_... and spring_force as in Forces.
+/// wxyz, of either sign). `at_most` and `at_least` bound the number itself or the norm of a vector.
+/// Here distance_moved is |x(time) - x(0)| and energy_change E(time) - E(0). A contact_force is the
+/// sum over the contacts of the body, contact_slip the largest |slip| of those with a force. Both
+/// are of contacts with the body `against` where one is named. For joint_... and spring_force see
+/// Forces.
 struct Expect {
   double time = 0;          ///< s; stepping: the first step boundary not before it
   bool throughout = false;  ///< holds at every record up to `time`, too
@@ -242,6 +246,7 @@ struct Expect {
   int joint = -1, spring = -1;  ///< of quantities of a joint, of a spring
 };
 
+/// All that a scene file says, in SI units; see docs/scene_fields.md.
 struct Scene {
   std::string name, file;
   double end = 1;                          ///< s
