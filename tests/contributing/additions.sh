@@ -60,19 +60,19 @@ touches() {
 }
 
 fresh
-like scene/src/effects/sleep.cpp scene/src/effects/doze.cpp 's/Sleep/Doze/g; s/sleep_effect/doze_effect/'
+like scene/src/effects/sleep.cpp scene/src/effects/doze.cpp 's/Sleep/Doze/g; s/(sleep,/(doze,/'
 edit scene/src/effects/CMakeLists.txt 's/^  sleep.cpp$/&\n  doze.cpp/'
 make_list effects
 compile doze scene/src/effects/doze.cpp scene/src/effects/list.cpp
 touches 2 'effect of scenes'
 
 fresh
-like scene/src/joints/kinds/ball.cpp scene/src/joints/kinds/pivot.cpp 's/Ball/Pivot/g; s/ball_joint/pivot_joint/; s/::ball/::pivot/'
+like scene/src/joints/kinds/ball.cpp scene/src/joints/kinds/pivot.cpp 's/Ball/Pivot/g; s/(ball,/(pivot,/; s/::ball/::pivot/'
 edit scene/src/joints/CMakeLists.txt 's,kinds/ball.cpp,& kinds/pivot.cpp,'
 edit scene/include/tether/scene/joint.hpp 's/universal, planar }/universal, planar, pivot }/; s/JointKind>, 7>/JointKind>, 8>/
   s/^    {"planar", .*/&\n    {"pivot", JointKind::pivot},/'
 make_list joints
-compile pivot scene/src/joints/kinds/pivot.cpp scene/src/joints/list.cpp
+compile pivot scene/src/joints/kinds/pivot.cpp scene/src/joints/joint_type.cpp
 touches 3 'joint of scenes'
 
 fresh

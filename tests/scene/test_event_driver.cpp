@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include "event/driver.hpp"
-#include "event/model/scaled_scene.hpp"
 #include "event/model/scene_model.hpp"
 #include "event_runs.hpp"
+#include "smooth/units.hpp"
 
 using namespace event_runs;
 using tether::scene::event::Bounces;

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "smooth/newton_matrix.hpp"
-#include "smooth/rows/elimination_order.hpp"
 #include "smooth/system.hpp"
 #include "smooth_runs.hpp"
 #include "sundials/quiet_context.hpp"

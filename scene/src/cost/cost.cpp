@@ -1,11 +1,4 @@
 // Tether: what accuracy costs in time. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <tether/scene/cost.hpp>
-#include <tether/scene/plan.hpp>
 
 #include "effects/list.hpp"
 #include "reference.hpp"

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <tether/scene/cost.hpp>
 
-#include "player/page_parts.hpp"
 #include "player/page_text.hpp"
 
 namespace tether::scene {

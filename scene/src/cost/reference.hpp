@@ -1,13 +1,48 @@
 // Tether: what errors are measured against. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "measure.hpp"
+#include <tether/scene/cost.hpp>
 
 namespace tether::scene::costs {
+
+/// Poses of the moving bodies at times, which ascend: all bodies at the first one, ...
+struct Samples {
+  std::vector<double> times;
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Quaterniond> orientations;
+};
+
+struct Measured {
+  RunResult result;
+  Samples samples;
+};
+
+/// Thrown where somebody does not want to wait.
+struct Interrupted {};
+
+/// Runs the scene, with poses at these times. Throws Interrupted.
+Measured measure_once(const Scene& scene, const std::vector<double>& times,
+                      const CostOptions& options);
+
+/// At those of the times that it has.
+Samples picked(const Samples& all, const std::vector<double>& times);
+
+/// The largest distance (m) and angle (rad) at the times of `a` that `b` has, too.
+double distance(const Samples& a, const Samples& b);
+
+/// So many equal times.
+std::vector<double> equal_times(double end, int count);
+/// The ends of all steps; of more than kMostPoses / bodies, each second, third, ...
+std::vector<double> step_ends(const Scene& scene, double step, int least);
+constexpr int kMostPoses = 50000;
+/// Those of both, once.
+std::vector<double> merged(const std::vector<double>& a, const std::vector<double>& b);
+
+/// The scene with one setting, and nothing written.
+Scene with_setting(const Scene& scene, CostMethod method, double setting);
+
+/// Step of a scene without [stepping]: a thousandth of the time, at most the default.
+double step_of(const Scene& scene);
 
 /// Times at which anything is compared with a reference (`all`), and those at which the reference
 /// is compared with others like it (`own`), which do not depend on what it is asked for.

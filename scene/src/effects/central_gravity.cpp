@@ -6,7 +6,6 @@
 //
 // A body is attracted as if all of its mass were at its centre; gravity_gradient.cpp has what its
 // extent adds.
-#include <cmath>
 
 #include "mechanics/effect.hpp"
 
@@ -145,9 +144,6 @@ class CentralGravityEffect : public Effect {
 
 }  // namespace
 
-const Effect& central_gravity_effect() {
-  static const CentralGravityEffect effect;
-  return effect;
-}
+TETHER_EFFECT(central_gravity, CentralGravityEffect)
 
 }  // namespace tether::scene::effects

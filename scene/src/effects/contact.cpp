@@ -2,7 +2,6 @@
 //
 // The stepping engine takes contact from tether::contact. A pair that no table names is an error
 // where bodies of it can touch: nothing is mixed from single materials.
-#include <algorithm>
 
 #include "mechanics/effect.hpp"
 
@@ -118,9 +117,6 @@ void ContactEffect::check(const Scene& scene, files::Report& report) const {
 
 }  // namespace
 
-const Effect& contact_effect() {
-  static const ContactEffect effect;
-  return effect;
-}
+TETHER_EFFECT(contact, ContactEffect)
 
 }  // namespace tether::scene::effects

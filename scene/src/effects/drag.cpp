@@ -188,9 +188,6 @@ class DragEffect : public Effect {
 
 }  // namespace
 
-const Effect& drag_effect() {
-  static const DragEffect effect;
-  return effect;
-}
+TETHER_EFFECT(drag, DragEffect)
 
 }  // namespace tether::scene::effects

@@ -1,11 +1,9 @@
 // Tether: friction of contacts. SPDX-License-Identifier: BSD-3-Clause
 //
 // |tangential impulse| <= friction * normal impulse, by the law of [stepping].
-#include <algorithm>
-#include <tether/scene/words.hpp>
 
 #include "mechanics/effect.hpp"
-#include "range.hpp"
+#include "numbers.hpp"
 
 namespace tether::scene::effects {
 
@@ -37,9 +35,6 @@ class FrictionEffect : public Effect {
 
 }  // namespace
 
-const Effect& friction_effect() {
-  static const FrictionEffect effect;
-  return effect;
-}
+TETHER_EFFECT(friction, FrictionEffect)
 
 }  // namespace tether::scene::effects

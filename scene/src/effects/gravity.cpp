@@ -1,7 +1,6 @@
 // Tether: uniform gravity. SPDX-License-Identifier: BSD-3-Clause
 //
 //   force m g at the centre of mass,   potential -m g . x
-#include <cmath>
 
 #include "mechanics/effect.hpp"
 
@@ -82,9 +81,6 @@ class Gravity : public Effect {
 
 }  // namespace
 
-const Effect& gravity_effect() {
-  static const Gravity effect;
-  return effect;
-}
+TETHER_EFFECT(gravity, Gravity)
 
 }  // namespace tether::scene::effects

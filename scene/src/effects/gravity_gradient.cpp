@@ -92,9 +92,6 @@ class GravityGradientEffect : public Effect {
 
 }  // namespace
 
-const Effect& gravity_gradient_effect() {
-  static const GravityGradientEffect effect;
-  return effect;
-}
+TETHER_EFFECT(gravity_gradient, GravityGradientEffect)
 
 }  // namespace tether::scene::effects

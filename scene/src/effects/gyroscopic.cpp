@@ -1,7 +1,6 @@
 // Tether: the gyroscopic term of the equations of motion. SPDX-License-Identifier: BSD-3-Clause
 //
 //   torque -w x I w in body axes; none where the inertia is a sphere's
-#include <tether/scene/words.hpp>
 
 #include "mechanics/effect.hpp"
 
@@ -69,9 +68,6 @@ class GyroscopicEffect : public Effect {
 
 }  // namespace
 
-const Effect& gyroscopic_effect() {
-  static const GyroscopicEffect effect;
-  return effect;
-}
+TETHER_EFFECT(gyroscopic, GyroscopicEffect)
 
 }  // namespace tether::scene::effects

@@ -1,7 +1,6 @@
 // Tether: invariants of the motion. SPDX-License-Identifier: BSD-3-Clause
 //
 // The smooth engine keeps them by projection, see smooth/kept_invariants.hpp.
-#include <tether/scene/words.hpp>
 
 #include "mechanics/effect.hpp"
 
@@ -48,9 +47,6 @@ class InvariantEffect : public Effect {
 
 }  // namespace
 
-const Effect& invariants_effect() {
-  static const InvariantEffect effect;
-  return effect;
-}
+TETHER_EFFECT(invariants, InvariantEffect)
 
 }  // namespace tether::scene::effects

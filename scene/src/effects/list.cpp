@@ -1,8 +1,6 @@
 // Tether: all effects. SPDX-License-Identifier: BSD-3-Clause
 #include "list.hpp"
 
-#include <algorithm>
-
 namespace tether::scene::effects {
 
 #define EFFECT(name) const Effect& name##_effect();

@@ -1,9 +1,6 @@
 // Tether: all effects. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {

@@ -5,12 +5,10 @@
 //   mean + sin(2 pi f t + phase), or that of a table, straight between its times
 //
 // Steps take the mean of the factor over their length: impulses of given forces are exact.
-#include <algorithm>
-#include <cmath>
 #include <tether/linalg/pi.hpp>
 
 #include "mechanics/effect.hpp"
-#include "periods.hpp"
+#include "numbers.hpp"
 
 namespace tether::scene::effects {
 
@@ -261,9 +259,6 @@ class LoadEffect : public Effect {
 
 }  // namespace
 
-const Effect& loads_effect() {
-  static const LoadEffect effect;
-  return effect;
-}
+TETHER_EFFECT(loads, LoadEffect)
 
 }  // namespace tether::scene::effects

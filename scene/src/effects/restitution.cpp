@@ -2,10 +2,9 @@
 //
 // Newton's law: normal velocity after an impact = -restitution * the one before; Poisson's: the
 // same of impulses.
-#include <algorithm>
 
 #include "mechanics/effect.hpp"
-#include "range.hpp"
+#include "numbers.hpp"
 
 namespace tether::scene::effects {
 
@@ -37,9 +36,6 @@ class RestitutionEffect : public Effect {
 
 }  // namespace
 
-const Effect& restitution_effect() {
-  static const RestitutionEffect effect;
-  return effect;
-}
+TETHER_EFFECT(restitution, RestitutionEffect)
 
 }  // namespace tether::scene::effects

@@ -2,10 +2,9 @@
 //
 // |moment across the normal| <= rolling * normal impulse, |moment about it| <= torsional * normal
 // impulse.
-#include <algorithm>
 
 #include "mechanics/effect.hpp"
-#include "range.hpp"
+#include "numbers.hpp"
 
 namespace tether::scene::effects {
 
@@ -41,9 +40,6 @@ class RollingFrictionEffect : public Effect {
 
 }  // namespace
 
-const Effect& rolling_friction_effect() {
-  static const RollingFrictionEffect effect;
-  return effect;
-}
+TETHER_EFFECT(rolling_friction, RollingFrictionEffect)
 
 }  // namespace tether::scene::effects

@@ -22,9 +22,6 @@ class SleepEffect : public Effect {
 
 }  // namespace
 
-const Effect& sleep_effect() {
-  static const SleepEffect effect;
-  return effect;
-}
+TETHER_EFFECT(sleep, SleepEffect)
 
 }  // namespace tether::scene::effects

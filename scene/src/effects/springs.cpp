@@ -4,10 +4,6 @@
 //
 //   tension k (|d| - rest) + c d|d|/dt along d,   potential k (|d| - rest)^2 / 2,
 //   power of the damper -c (d|d|/dt)^2
-#include <fmt/format.h>
-
-#include <cmath>
-#include <stdexcept>
 
 #include "mechanics/effect.hpp"
 #include "mechanics/pair_forces.hpp"
@@ -230,9 +226,6 @@ class SpringEffect : public Effect {
 
 }  // namespace
 
-const Effect& springs_effect() {
-  static const SpringEffect effect;
-  return effect;
-}
+TETHER_EFFECT(springs, SpringEffect)
 
 }  // namespace tether::scene::effects

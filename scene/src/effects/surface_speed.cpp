@@ -65,9 +65,6 @@ class SurfaceSpeedEffect : public Effect {
 
 }  // namespace
 
-const Effect& surface_speed_effect() {
-  static const SurfaceSpeedEffect effect;
-  return effect;
-}
+TETHER_EFFECT(surface_speed, SurfaceSpeedEffect)
 
 }  // namespace tether::scene::effects

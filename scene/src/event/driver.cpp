@@ -3,18 +3,44 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <tether/linalg/index.hpp>
-#include <tether/scene/engine.hpp>
-
-#include "local_tolerance.hpp"
 #include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
 
 namespace {
+
+constexpr double kLeastLocal = 1e-13, kLeastInFlight = 2e-13;  // of IDA: more is rounding
+constexpr double kTight = 1e-11;
+
+// Method, eq. 12: IDA bounds the error of a step. What it adds up to over tens of events, and tens
+// of periods between them, is to be within ten tolerances (a mass that rubs to rest in thirteen
+// turns).
+double wanted_tolerance(double tolerance) {
+  return std::min(1.0, std::pow(tolerance / 1e-4, 0.066)) * 0.025 * tolerance;
+}
+
+double local_tolerance(double tolerance) {
+  return std::max(wanted_tolerance(tolerance), kLeastLocal);
+}
+
+// From a bounce on: an error of the height is one of the time of the next impact, over its speed.
+double flight_tolerance(double tolerance, double speed) {
+  const double wanted = wanted_tolerance(tolerance), local = local_tolerance(tolerance);
+  if (wanted >= kTight) return local;
+  return std::min(local, std::max(kLeastInFlight, wanted * std::min(1.0, speed)));
+}
+
+// To an impact with this speed that does not end a bounce. Errors of gaps are those of its time,
+// over the speed; what the phase before has left is a part of the tolerance.
+double graze_tolerance(double tolerance, double speed) {
+  constexpr double kSlow = 0.04;
+  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, speed / kSlow));
+}
+
+// Tolerance of IDA after a slip begins at rest with this acceleration.
+double turn_tolerance(double tolerance, double acceleration) {
+  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, acceleration));
+}
 
 constexpr long kMostAtOneTime = 300;
 constexpr double kStartTolerance = 1e-4;
@@ -27,6 +53,19 @@ constexpr long kFewEvents = 100;
 constexpr double kMostStorms = 25;  // as much work again for the rest of the run
 
 using linalg::at;
+
+// The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
+// T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
+constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
+constexpr double kAtGaps = 0.01;  // of their bands: gaps that are no rounding
+
+/// Until a gap that falls with the acceleration `back` is zero, s; 0: never.
+double flight_time(double gap, double rate, double back) {
+  const double square = rate * rate + 2 * back * gap;
+  if (square < 0) return 0;
+  const double root = std::sqrt(square);
+  return rate > 0 ? (back > 0 ? (rate + root) / back : 0) : 2 * gap / (root - rate);
+}
 
 }  // namespace
 
@@ -389,8 +428,161 @@ void Driver::fail(const std::string& what) const {
 
 Counts Driver::counts() const {
   Counts all = counts_;
-  if (phase_) add_work(all, phase_->counts());
+  if (phase_) all += phase_->counts();
   return all;
+}
+
+void Driver::begin_phase() {
+  settle_velocities();
+  motion_.keep_energy_of(event_time_, y_);
+  const VectorXd before = y_;
+  if (!move_onto_constraints(motion_, local_, event_time_, y_)) {
+    y_ = before;
+    model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+    fail(contradiction());
+  }
+  start_phase();
+}
+
+std::string Driver::contradiction() const {
+  double gap = 0, band = 0, rate = 0;
+  for (const int i : motion_.closed()) {
+    gap = std::max(gap, std::abs(model_.gap(i, rate)));
+    band = std::max(band, bands().gap(i));
+  }
+  const double unit = model_.length_unit();
+  std::string text = "the state cannot be moved onto joints and closed contacts";
+  // Both sides of a clearance, say.
+  if (gap > kAtGaps * band)
+    text += fmt::format(
+        ": at this tolerance gaps of up to {:.3g} m count as closed, and of the {} contacts that "
+        "do so "
+        "one has {:.3g} m. A smaller tolerance tells them apart",
+        unit * band, motion_.closed().size(), unit * gap);
+  return text;
+}
+
+// Removes the normal velocities, less than their bands, that contacts have when they close.
+void Driver::settle_velocities() {
+  const double energy = model_.energy();
+  motion_.settle_velocities(event_time_, y_);
+  const double lost = energy - model_.energy();
+  if (!events_.empty() && events_.back().time == event_time_) events_.back().lost += lost;
+}
+
+// Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
+// on with the same bits.
+void Driver::start_phase(double most) {
+  modes_ = motion_.modes();
+  rows_are_weak_ = false;
+  model_.begin_anew(event_time_);
+  motion_.choose(event_time_, y_, modes_);
+  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  std::vector<bool> leaving(at(model_.contacts()), false);
+  double local = std::min(local_, most);
+  for (int i = 0; i < model_.contacts(); ++i) {
+    if (model_.is_apart(i, bands().gap(i))) continue;
+    double rate = 0;
+    const double gap = model_.gap(i, rate);
+    leaving[at(i)] = motion_.modes()[at(i)].mode == Mode::open && std::abs(gap) <= bands().gap(i) &&
+                     rate > bands().approach(i);
+    if (leaving[at(i)]) local = std::min(local, flight_tolerance(options_.tolerance, rate));
+  }
+  local = std::min(local, turn_tolerance(options_.tolerance, slowest_turn()));
+  if (phase_) counts_ += phase_->counts();
+  phase_.reset();
+  const double first = longest_first_step(leaving);
+  kink_ = model_.next_kink(event_time_);
+  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, event_time_, y_, first,
+                                   kink_ - event_time_);
+  watcher_.begin(event_time_, y_, leaving);
+  next_.reset();
+}
+
+// The least acceleration of a slip that begins at rest. What is left of a swing with friction may
+// be small, and an error of its slip is one of the time at which it ends, over that acceleration.
+double Driver::slowest_turn() {
+  double least = 1;
+  VectorXd rate;
+  for (std::size_t k = 0; k < motion_.closed().size(); ++k) {
+    const int i = motion_.closed()[k], at_once = static_cast<int>(k);
+    if (motion_.modes()[at(i)].mode != Mode::slide || model_.law(i).friction == 0) continue;
+    if (rate.size() == 0) {
+      rate.resize(motion_.size());
+      motion_.rate(event_time_, y_.data(), rate.data());
+    }
+    if (motion_.slip(at_once).norm() > bands().slip(i)) continue;
+    const double turns = motion_.slip_rate(at_once).norm();
+    if (turns > 0) least = std::min(least, turns);
+  }
+  return least;
+}
+
+// A flight that is shorter than the tolerance's first step must be resolved all the same: bounces,
+// and the ways of contacts that are about to close.
+double Driver::longest_first_step(const std::vector<bool>& leaving) {
+  VectorXd rate(motion_.size());
+  motion_.rate(event_time_, y_.data(), rate.data());
+  const VectorXd a = motion_.acceleration();
+  const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
+  double longest = 0;
+  ContactLook look;
+  for (int i = 0; i < model_.contacts(); ++i) {
+    if (motion_.modes()[at(i)].mode != Mode::open) continue;
+    if (model_.is_apart(i, bands().gap(i))) continue;
+    double speed = 0;
+    const double gap = leaving[at(i)] ? 0 : model_.gap(i, speed);
+    if (leaving[at(i)]) model_.gap(i, speed);
+    const bool closing = gap > 0 && gap <= bands().gap(i) && speed < -bands().approach(i);
+    if (!leaving[at(i)] && !closing) continue;
+    model_.look(i, look);
+    const double flight = flight_time(gap, speed, -(look.normal.dot(a) + look.normal_rest));
+    if (!(flight > 0)) continue;
+    const double first = std::max(part * flight, kLeastWay / std::abs(speed));
+    longest = longest > 0 ? std::min(longest, first) : first;
+  }
+  return longest;
+}
+
+// After a step a contact that is closed has a gap and a normal speed of the step's order. Its
+// bodies are moved until it has none, as the driver of events keeps it from there on: velocities by
+// impulses, places by the least move.
+
+std::optional<std::vector<int>> closed_contacts(Model& model, const StartState& state) {
+  std::vector<int> out;
+  for (int i = 0; i < model.contacts(); ++i) {
+    if (!model.law(i).has_normal()) continue;
+    if (model.is_apart(i, state.gap)) continue;
+    double rate = 0;
+    const double gap = model.gap(i, rate), margin = model.margin(i);
+    if (gap > state.gap || margin < -state.gap) continue;
+    if (gap >= -state.gap && std::abs(rate) <= state.speed)
+      out.push_back(i);
+    else if (gap < 0 && (gap >= -state.gap || std::isinf(margin)))
+      return {};  // what lies deep behind a face with a border may be beside it
+  }
+  return out;
+}
+
+void Driver::close_contacts(const StartState& start) {
+  const std::optional<std::vector<int>> closed = closed_contacts(model_, start);
+  if (!closed) throw std::invalid_argument("bodies overlap");
+  if (closed->empty()) return;
+  // Frictionless: what slips slips on.
+  std::vector<ContactMode> modes(at(model_.contacts()));
+  for (const int i : without_doubles(*closed)) {
+    modes[at(i)].mode = Mode::slide;
+    modes[at(i)].direction = VectorXd::Unit(model_.tangents(), 0);
+  }
+  motion_.choose(time_, y_, std::move(modes));
+  motion_.settle_velocities(time_, y_);
+  motion_.set_levels(std::vector<double>(at(model_.contacts()), 0.0));
+  motion_.leave_energy_free();
+  if (!move_onto_constraints(motion_, local_, time_, y_))
+    throw SimulationError("contacts of a step cannot be closed together");
+  motion_.choose(time_, y_, std::vector<ContactMode>(at(model_.contacts())));
+  model_.set(time_, y_.data(), y_.data() + motion_.coordinates());
+  model_.settle();
 }
 
 }  // namespace tether::scene::event

@@ -8,19 +8,24 @@
 //                   the state onto the new constraints, a new phase
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "event.hpp"
 #include "event/phase/friction_solve.hpp"
 #include "event/phase/motion.hpp"
 #include "event/phase/phase.hpp"
 #include "event/phase/watch.hpp"
 
 namespace tether::scene::event {
+
+using EventKind = ContactEvent::Kind;
+
+/// Event of one contact. Several contacts may have events of one time.
+struct EventRecord {
+  double time = 0;
+  EventKind kind = EventKind::impact;
+  int contact = -1;
+  double before = 0, after = 0;                       ///< normal velocities
+  Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on the first body, world axes
+  double lost = 0;  ///< energy of all contacts of this instant, in its first record
+};
 
 struct DriverOptions {
   double tolerance = 1e-6;  ///< of the motion, in the units of the model

@@ -1,20 +1,14 @@
 // Tether: the engine of scenes whose events are found to a tolerance. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <algorithm>
-#include <cmath>
-#include <istream>
-#include <ostream>
-#include <stdexcept>
 
 #include "driver.hpp"
-#include "effects/periods.hpp"
-#include "event/model/scaled_scene.hpp"
+#include "effects/numbers.hpp"
 #include "event/model/scene_model.hpp"
 #include "event/resumable.hpp"
-#include "joints/list.hpp"
-#include "mechanics/placed_bodies.hpp"
+#include "joints/joint_type.hpp"
+#include "mechanics/bodies.hpp"
 #include "output/binary.hpp"
-#include "output/saved_bodies.hpp"
+#include "smooth/units.hpp"
 
 namespace tether::scene {
 

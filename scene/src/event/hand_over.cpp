@@ -3,50 +3,24 @@
 //
 // Steps stand in until they have brought the bodies to where the same contacts stay closed: what
 // events could not decide or end (accumulation, a storm) is over then.
-#include <algorithm>
-#include <cmath>
-#include <istream>
 #include <iterator>
-#include <ostream>
 #include <sstream>
-#include <stdexcept>
-#include <utility>
 
 #include "event/resumable.hpp"
 #include "output/binary.hpp"
-#include "output/saved_bodies.hpp"
 #include "stepping/stepping_engine.hpp"
 
 namespace tether::scene {
 
 namespace {
 
-constexpr binary::Magic kHandedOver = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '2'};
+constexpr binary::Magic kHandedOver = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '3'};
 
 // Steps go on until this many of them have left the same contacts closed. It doubles where events
 // have come less far than that before they were given up again.
 constexpr std::int64_t kCalmSteps = 20, kMostCalmSteps = std::int64_t{1} << 40;
 constexpr std::uint64_t kMostHandOvers = 1000;  // then steps go to the end
 constexpr long kMostCounted = 1L << 40;         // in a state: sums of a few of them are numbers
-
-/// Those that the event engine has.
-template <class Counts, class F>
-void each_number(Counts& c, const F& f) {
-  for (auto* n : {&c.steps, &c.residual_evaluations, &c.jacobian_evaluations, &c.projections,
-                  &c.error_test_failures, &c.contact_problems, &c.events, &c.impacts})
-    f(*n);
-}
-
-/// Those that the stepping engine has.
-void add_steps(Counts& sum, const Counts& c) {
-  sum.steps += c.steps;
-  sum.contact_problems += c.contact_problems;
-  sum.sweeps += c.sweeps;
-  sum.unsolved += c.unsolved;
-  sum.accepted += c.accepted;
-  sum.halved += c.halved;
-  sum.error_test_failures += c.error_test_failures;
-}
 
 double energy_of(const Engine& engine) {
   const Diagnostics d = engine.diagnostics();
@@ -89,7 +63,7 @@ class EventsThenSteps final : public Engine {
   Counts counts() const override {
     if (hand_overs_.empty()) return events_->counts();
     Counts c = steps_before_;
-    if (steps_) add_steps(c, counts_of_steps());
+    if (steps_) c += counts_of_steps();
     const Counts of_events = counts_of_events();
     c.events = of_events.events;
     c.impacts = of_events.impacts;
@@ -229,7 +203,7 @@ void EventsThenSteps::give_back() {
   event.kind = ContactEvent::Kind::resume;
   event.lost = lost;
   told_.push_back(event);
-  add_steps(steps_before_, counts_of_steps());
+  steps_before_ += counts_of_steps();
   steps_.reset();
   tell_events();
 }
@@ -237,12 +211,15 @@ void EventsThenSteps::give_back() {
 template <class Self>
 void EventsThenSteps::exchange_hand_overs(Self& self, binary::Archive& io) {
   io.list(self.hand_overs_, [&](auto& each) {
-    each_number(each.before, [&](auto& n) { io(n); });
+    Counts before = each.before;
+    before.each([&](long& n) { io(n); });
     double back = each.back.value_or(-1);
     io(each.time, back, each.lost, each.why);
     io.demand(std::isfinite(each.time) && std::isfinite(back) && std::isfinite(each.lost));
-    if constexpr (!std::is_const_v<Self>)
+    if constexpr (!std::is_const_v<Self>) {
+      each.before = before;
       if (back >= 0) each.back = back;
+    }
   });
   io(self.energy_, self.calm_, self.enough_);
   io.demand(std::isfinite(self.energy_) && self.calm_ >= 0 && self.calm_ <= kMostCalmSteps &&
@@ -266,7 +243,8 @@ bool EventsThenSteps::are_in_order() const {
   bool good = !hand_overs_.empty() && hand_overs_.size() <= kMostHandOvers;
   std::optional<double> since = 0;
   for (const HandOver& each : hand_overs_) {
-    each_number(each.before, [&](long n) { good = good && n >= 0 && n <= kMostCounted; });
+    Counts before = each.before;
+    before.each([&](long n) { good = good && n >= 0 && n <= kMostCounted; });
     good = good && since && each.time >= *since && each.back.value_or(each.time) >= each.time;
     since = each.back;
   }

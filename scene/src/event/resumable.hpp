@@ -1,11 +1,7 @@
 // Tether: an event engine that steps give back to. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <optional>
 #include <tether/scene/engine.hpp>
-#include <vector>
 
 namespace tether::scene::event {
 

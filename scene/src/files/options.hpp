@@ -4,8 +4,6 @@
 // is, a whole number between two others, a flag, or a word.
 #pragma once
 
-#include <tether/scene/scene.hpp>
-
 #include "toml/fields.hpp"
 #include "toml/writer.hpp"
 

@@ -1,12 +1,24 @@
 // Tether: parts of the scene reader. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-#include <tether/scene/scene.hpp>
+#include <istream>
 
+#include "toml/document.hpp"
 #include "toml/reader.hpp"
 
 namespace tether::scene::files {
+
+/// All that is left of it, a block more than `most` bytes at most. By blocks: reading a folder, or
+/// a file that is truncated meanwhile, fails without a throw.
+inline std::string read_stream(std::istream& in, std::size_t most) {
+  std::string text;
+  std::vector<char> block(std::size_t{1} << 16);
+  while (in && text.size() <= most) {
+    in.read(block.data(), static_cast<std::streamsize>(block.size()));
+    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
+  }
+  return text;
+}
 
 /// One [[body]], but for the fields of effects.
 Body read_body(Fields& in, Reader& r);
@@ -14,5 +26,13 @@ Body read_body(Fields& in, Reader& r);
 Scene read(Value document, const std::string& name);
 /// Checks across fields: names, pairs of materials, bodies that cannot move, times.
 void check(const Scene& scene, Report& report);
+
+constexpr std::size_t kMostElements = 100000;  // that one scene may have by repetition
+constexpr std::size_t kMostCopied = 3000000;   // values of TOML in them, some hundred bytes each
+constexpr std::size_t kBytesOfValue = 100;     // of texts that count as one value more
+
+/// Replaces each [[body]], [[joint]], [[spring]] and [[load]] that has `repeat` by its copies.
+/// Throws SceneError where a repetition is wrong or makes too many.
+void repeat_elements(Value& document, const std::string& file);
 
 }  // namespace tether::scene::files

@@ -1,12 +1,7 @@
 // Tether: elements of a scene that stand for many. SPDX-License-Identifier: BSD-3-Clause
-#include "repeat.hpp"
+#include "read.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
 
 namespace tether::scene::files {
 

@@ -1,10 +1,8 @@
 // Tether: a scene file with other numbers in it. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <tether/scene/vary.hpp>
-#include <utility>
 
 #include "read.hpp"
 #include "toml/document.hpp"

@@ -1,10 +1,6 @@
 // Tether: a scene as TOML, every default spelt out. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
 
-#include <cmath>
 #include <iterator>
-#include <tether/scene/files.hpp>
-#include <tether/scene/words.hpp>
 
 #include "effects/list.hpp"
 #include "options.hpp"

@@ -1,7 +1,6 @@
 // Tether: volume, centre and inertia of shapes. SPDX-License-Identifier: BSD-3-Clause
 #include "mass.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/convex_hull.hpp>

@@ -1,9 +1,7 @@
 // Tether: volume, centre and inertia of shapes. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <tether/scene/scene.hpp>
-#include <vector>
 
 namespace tether::scene {
 

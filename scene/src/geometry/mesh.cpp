@@ -1,7 +1,6 @@
 // Tether: shapes as polygons, for files and pictures. SPDX-License-Identifier: BSD-3-Clause
 #include "mesh.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
 #include <numeric>
 #include <tether/linalg/convex_hull.hpp>

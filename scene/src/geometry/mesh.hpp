@@ -1,9 +1,7 @@
 // Tether: shapes as polygons, for files and pictures. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <tether/scene/scene.hpp>
-#include <vector>
 
 namespace tether::scene {
 

@@ -1,5 +1,5 @@
 // Tether: closures of loops as joints of a scene. SPDX-License-Identifier: BSD-3-Clause
-#include "import/closures.hpp"
+#include "closures.hpp"
 
 #include <fmt/format.h>
 

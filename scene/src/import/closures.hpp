@@ -1,7 +1,7 @@
 // Tether: closures of loops as joints of a scene. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "import/joints.hpp"
+#include "parts.hpp"
 
 namespace tether::scene::import {
 

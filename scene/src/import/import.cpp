@@ -6,9 +6,8 @@
 #include <exception>
 #include <tether/scene/run.hpp>
 
-#include "import/draft.hpp"
-#include "import/mjcf/mjcf.hpp"
-#include "import/urdf/urdf.hpp"
+#include "parts.hpp"
+#include "xml.hpp"
 
 namespace tether::scene::import {
 

@@ -3,13 +3,8 @@
 // URDF (wiki.ros.org/urdf/XML) and MJCF (mujoco.readthedocs.io, "XML reference").
 #pragma once
 
-#include <optional>
 #include <set>
-#include <string>
-#include <string_view>
 #include <tether/scene/files.hpp>
-#include <utility>
-#include <vector>
 
 namespace tether::scene::import {
 

@@ -1,9 +1,9 @@
 // Tether: what moves as one. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "import/import.hpp"
-#include "import/robot/model.hpp"
-#include "import/robot/xml.hpp"
+#include "import.hpp"
+#include "robot.hpp"
+#include "xml.hpp"
 
 namespace tether::scene::import {
 
@@ -36,5 +36,20 @@ struct Part {
 /// on them, or left out where nothing does. Reports parts that no scene can have. Throws
 /// std::invalid_argument where an option names a joint that is not there, or asks too much of it.
 std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problems& problems);
+
+/// A scene, with a comment for each of its bodies and joints.
+struct Draft {
+  Scene scene;
+  std::vector<std::string> body_comments, joint_comments;
+};
+
+/// Adds the joints that carry `part`, which is the body `body`, on the body `on` (-1: the world).
+/// Several joints are one where scenes have it (universal, ball, planar, none), else small bodies
+/// stand between them.
+void add_joints(const Part& part, int body, int on, const ImportOptions& options, Draft& draft,
+                Remarks& remarks);
+
+Draft make_draft(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
+                 Remarks& remarks);
 
 }  // namespace tether::scene::import

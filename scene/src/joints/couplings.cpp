@@ -5,15 +5,12 @@
 //
 // s is the angle or way of a hinge or slider, which is 0 at t = 0: a row (Relation) as those of
 // joints, whose multiplier acts along each s.
-#include "couplings.hpp"
+#include "joint_rows.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
-#include <stdexcept>
 #include <tether/linalg/pi.hpp>
 
-#include "joints/list.hpp"
+#include "joint_type.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene {
@@ -227,10 +224,7 @@ class CouplingEffect : public Effect {
 
 }  // namespace
 
-const Effect& couplings_effect() {
-  static const CouplingEffect effect;
-  return effect;
-}
+TETHER_EFFECT(couplings, CouplingEffect)
 
 }  // namespace effects
 

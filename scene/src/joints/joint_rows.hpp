@@ -1,14 +1,24 @@
 // Tether: the rows of all joints of a scene. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cmath>
-#include <string>
-#include <tether/scene/scene.hpp>
+#include <tether/scene/engine.hpp>
 #include <type_traits>
-#include <vector>
 
+#include "coordinate.hpp"
 #include "mechanics/bodies.hpp"
 #include "rows.hpp"
+
+namespace tether::scene::couplings {
+
+/// The polynomial of each of its joints, from degree 1 on, whose sum vanishes. Ratios of angles
+/// that are fractions of small numbers, but for rounding, are these. Throws std::invalid_argument.
+std::vector<std::vector<double>> polynomials(const Scene& scene, const Coupling& coupling);
+
+/// The sum grows by multiples of this where an angle grows by a full turn; 0: nothing is known.
+double turn(const Scene& scene, const Coupling& coupling,
+            const std::vector<std::vector<double>>& polynomials);
+
+}  // namespace tether::scene::couplings
 
 namespace tether::scene::joints {
 
@@ -138,5 +148,19 @@ void JointRows::each_unit_load(const Row& row, const Bodies& bodies, const F& f)
     if (bodies.moves(row.second)) f(i, row.second, b.force, Vector3d(B.R.transpose() * b.torque));
   }
 }
+
+/// The reactions that the multipliers of the rows make, N and N m, for each joint of the scene.
+class Reactions {
+ public:
+  /// `bodies`: at t = 0.
+  Reactions(const Scene& scene, const Bodies& bodies);
+
+  /// Multipliers by row, N or N m, at the places that the rows and bodies are set to.
+  std::vector<JointForce> find(const JointRows& rows, const Bodies& bodies,
+                               const double* multipliers) const;
+
+ private:
+  std::vector<Coordinate> joints_;
+};
 
 }  // namespace tether::scene::joints

@@ -2,14 +2,10 @@
 // BSD-3-Clause
 #pragma once
 
-#include <stdexcept>
-#include <string>
-#include <tether/scene/joint.hpp>
-
+#include "coordinate.hpp"
 #include "joint_rows.hpp"
 #include "mechanics/momenta.hpp"
 #include "mechanics/units.hpp"
-#include "motion_of.hpp"
 #include "toml/fields.hpp"
 #include "toml/writer.hpp"
 
@@ -81,5 +77,24 @@ class AxisJoint : public JointType {
     check_axis(joint.axis, name);
   }
 };
+
+/// Defines <name>_joint(), which the list of joints asks for.
+#define TETHER_JOINT(name, Kind)    \
+  const JointType& name##_joint() { \
+    static const Kind joint;        \
+    return joint;                   \
+  }
+
+/// Throws std::invalid_argument for a value that is no kind of joint.
+const JointType& type(JointKind kind);
+
+/// That of the scene or, without one, its kind and index.
+std::string name_of(const Joint& joint, std::size_t index);
+
+/// Its free or prescribed coordinate is an angle.
+bool is_angle(const Joint& joint);
+
+/// Rows of a joint on positions and orientations.
+int row_count(const Joint& joint);
 
 }  // namespace tether::scene::joints

@@ -1,12 +1,11 @@
 // Tether: joints of a scene as an effect. SPDX-License-Identifier: BSD-3-Clause
 //
 // Their forces are the multipliers of their rows, which the smooth engine solves for.
-#include <tether/scene/words.hpp>
 
 #include "effects/list.hpp"
-#include "list.hpp"
+#include "joint_type.hpp"
 #include "mechanics/effect.hpp"
-#include "prescribed_motion.hpp"
+#include "rows.hpp"
 
 namespace tether::scene::effects {
 
@@ -119,9 +118,6 @@ class JointEffect : public Effect {
 
 }  // namespace
 
-const Effect& joints_effect() {
-  static const JointEffect effect;
-  return effect;
-}
+TETHER_EFFECT(joints, JointEffect)
 
 }  // namespace tether::scene::effects

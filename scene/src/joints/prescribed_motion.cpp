@@ -1,12 +1,10 @@
 // Tether: prescribed motions of joints. SPDX-License-Identifier: BSD-3-Clause
-#include "prescribed_motion.hpp"
+#include "rows.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <tether/linalg/pi.hpp>
 
-#include "effects/periods.hpp"
-#include "list.hpp"
+#include "effects/numbers.hpp"
+#include "joint_type.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene {
@@ -96,10 +94,7 @@ class PrescribedMotion : public Effect {
 
 }  // namespace
 
-const Effect& prescribed_motion_effect() {
-  static const PrescribedMotion effect;
-  return effect;
-}
+TETHER_EFFECT(prescribed_motion, PrescribedMotion)
 
 }  // namespace effects
 

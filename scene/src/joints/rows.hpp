@@ -9,16 +9,23 @@
 // the frames of the bodies, `row` is the first row, `has_length` tells a g in m from one in rad.
 #pragma once
 
-#include <cmath>
-#include <limits>
-#include <tuple>
-#include <vector>
-
-#include "laws/coordinate.hpp"
+#include "coordinate.hpp"
 #include "mechanics/frames.hpp"
-#include "prescribed_motion.hpp"
+#include "toml/fields.hpp"
+#include "toml/writer.hpp"
 
 namespace tether::scene::joints {
+
+/// The value of a motion and its derivatives at one time.
+struct Now {
+  double s = 0, s1 = 0, s2 = 0;
+};
+
+Now evaluate(const Motion& motion, double t);
+
+/// The fields of motion = {...}; `angle`: in rad or degrees, else in m.
+Motion read_motion(files::Fields& in, bool angle);
+void write_motion(const Motion& motion, bool angle, files::Writer& out);
 
 using namespace mechanics;
 

@@ -2,10 +2,9 @@
 // BSD-3-Clause
 #pragma once
 
-#include <vector>
+#include <tether/scene/scene.hpp>
 
 #include "frames.hpp"
-#include "index.hpp"
 
 namespace tether::scene::mechanics {
 
@@ -45,5 +44,9 @@ inline Vector3d direction_in(const Frame<double>& f, const Vector3d& u) {
 struct Load6 {
   Vector3d force, torque_body, torque_world;
 };
+
+/// Frames of all bodies and, last, of the world: positions and attitudes of the scene, at rest; no
+/// inertia, and nothing moves yet.
+Bodies placed_bodies(const Scene& scene);
 
 }  // namespace tether::scene::mechanics

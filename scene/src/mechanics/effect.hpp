@@ -2,17 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
-#include <fmt/format.h>
-
-#include <functional>
-#include <memory>
-#include <string>
-#include <string_view>
-#include <tether/contact/joint_laws.hpp>
-#include <tether/contact/stepping.hpp>
 #include <tether/scene/plan.hpp>
-#include <tether/scene/scene.hpp>
-#include <vector>
 
 #include "force.hpp"
 #include "momenta.hpp"
@@ -136,5 +126,12 @@ class Effect {
 namespace tether::scene::effects {
 
 using mechanics::Effect;
+
+/// Defines <name>_effect(), which the list of effects asks for.
+#define TETHER_EFFECT(name, Kind) \
+  const Effect& name##_effect() { \
+    static const Kind effect;     \
+    return effect;                \
+  }
 
 }  // namespace tether::scene::effects

@@ -1,7 +1,6 @@
 // Tether: entries of a Jacobian, written in a fixed order. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <utility>
 #include <vector>
 

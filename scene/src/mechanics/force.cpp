@@ -1,7 +1,98 @@
 // Tether: impulses of forces. SPDX-License-Identifier: BSD-3-Clause
 #include "force.hpp"
 
+#include <Eigen/LU>
+
+#include "bodies.hpp"
+
 namespace tether::scene::mechanics {
+
+Bodies placed_bodies(const Scene& scene) {
+  const std::size_t count = scene.bodies.size();
+  Bodies bodies;
+  bodies.inertia.resize(count + 1);
+  bodies.frames.resize(count + 1);
+  bodies.w.assign(count + 1, Vector3d::Zero());
+  for (std::size_t b = 0; b <= count; ++b) {
+    Frame<double>& f = bodies.frames[b];
+    f.x = f.v = f.W = f.a = f.alpha = Vector3d::Zero();
+    f.R = Matrix3d::Identity();
+    if (b == count) continue;  // the world
+    f.x = scene.bodies[b].position;
+    f.R = scene.bodies[b].orientation.normalized().toRotationMatrix();
+  }
+  return bodies;
+}
+
+SteppedBodies::SteppedBodies(const Scene& scene) : bodies_(placed_bodies(scene)) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const Body& body = scene.bodies[b];
+    if (body.fixed) continue;
+    bodies_.inertia[b] = {bodies_.moving++, body.mass, body.inertia, body.inertia.inverse()};
+  }
+  loads_.resize(at(bodies_.moving));
+  before_ = bodies_;
+}
+
+void SteppedBodies::begin(const contact::BodySet& set, const Vector3d& weight) {
+  for (int b = 0; b < set.size(); ++b) {
+    if (!bodies_.moves(b)) continue;
+    Frame<double>& f = before_.frames[at(b)];
+    f.x = set.position[at(b)];
+    f.R = set.orientation[at(b)].toRotationMatrix();
+    f.v = set.motion[at(b)].velocity - weight;
+    f.W = set.motion[at(b)].angular_velocity;
+  }
+}
+
+void SteppedBodies::damp(int body, double dt, const Vector3d& force, const Vector3d& torque) {
+  push(body, dt, force, torque);
+  if (!bodies_.moves(body)) return;
+  Frame<double>& f = before_.frames[at(body)];
+  f.v += dt * motion(body).inverse_mass * force;
+  f.W += dt * (motion(body).inverse_inertia * torque);
+}
+
+void SteppedBodies::read(contact::BodySet& set) {
+  set_ = &set;
+  look_at(set);
+}
+
+void SteppedBodies::look_at(const contact::BodySet& set) {
+  for (int b = 0; b < set.size(); ++b) {
+    if (!bodies_.moves(b)) continue;
+    Frame<double>& f = bodies_.frames[at(b)];
+    f.x = set.position[at(b)];
+    f.R = set.orientation[at(b)].toRotationMatrix();
+    f.v = set.motion[at(b)].velocity;
+    f.W = set.motion[at(b)].angular_velocity;
+    bodies_.w[at(b)] = f.R.transpose() * f.W;
+  }
+}
+
+void SteppedBodies::read_positions(const contact::BodySet& set) {
+  for (int b = 0; b < set.size(); ++b) {
+    if (!bodies_.moves(b)) continue;
+    bodies_.frames[at(b)].x = set.position[at(b)];
+    bodies_.frames[at(b)].R = set.orientation[at(b)].toRotationMatrix();
+  }
+}
+
+void SteppedBodies::set_velocity(int body, const Vector3d& velocity,
+                                 const Vector3d& angular_velocity) {
+  contact::RigidBody& motion = set_->motion[at(body)];
+  Frame<double>& f = bodies_.frames[at(body)];
+  motion.velocity = f.v = velocity;
+  motion.angular_velocity = f.W = angular_velocity;
+  bodies_.w[at(body)] = f.R.transpose() * f.W;
+}
+
+void SteppedBodies::push(int body, double dt, const Vector3d& force, const Vector3d& torque) {
+  if (!bodies_.moves(body)) return;
+  const contact::RigidBody& motion = set_->motion[at(body)];
+  set_velocity(body, motion.velocity + dt * motion.inverse_mass * force,
+               motion.angular_velocity + dt * (motion.inverse_inertia * torque));
+}
 
 void Force::step(SteppedBodies& stepped, double dt) const {
   const Bodies& bodies = stepped.bodies();

@@ -1,8 +1,6 @@
 // Tether: which momenta of a scene nothing outside changes. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-#include <string>
 #include <tether/scene/scene.hpp>
 
 namespace tether::scene::mechanics {

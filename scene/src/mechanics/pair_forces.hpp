@@ -1,9 +1,6 @@
 // Tether: forces between two bodies each. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <utility>
-#include <vector>
-
 #include "force.hpp"
 
 namespace tether::scene::mechanics {

@@ -3,19 +3,30 @@
 // For the machine that wrote them: a state is for going on, not for exchange.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <cstdint>
+#include <cmath>
 #include <istream>
 #include <ostream>
-#include <stdexcept>
-#include <string>
+#include <string_view>
+#include <tether/scene/engine.hpp>
 #include <type_traits>
-#include <vector>
 
 namespace tether::scene::binary {
 
 using Magic = char[8];  ///< The first letters of a part of a state.
+
+/// Whether the next letters are these, which are read then.
+inline bool begins(std::istream& in, const Magic& wanted) {
+  Magic found = {};
+  in.read(found, sizeof found);
+  return in && std::string_view(found, sizeof found) == std::string_view(wanted, sizeof wanted);
+}
+
+/// FNV-1a.
+inline std::uint64_t hash_of(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return hash;
+}
 
 /// Writes an object into a state, or reads it: what it consists of is said once.
 class Archive {
@@ -99,3 +110,24 @@ class Archive {
 };
 
 }  // namespace tether::scene::binary
+
+namespace tether::scene {
+
+/// The first letters of a state that begins with its bodies.
+constexpr binary::Magic kBodiesFirst = {'b', 'o', 'd', 'i', 'e', 's', ' ', '1'};
+
+/// Their number, the time and what moves them. Throws std::runtime_error on other numbers of bodies
+/// and on what is no motion.
+template <class Bodies>
+void exchange_bodies(binary::Archive& io, double& time, Bodies& bodies) {
+  auto count = static_cast<std::uint64_t>(bodies.size());
+  io(count, time);
+  if (count != bodies.size())
+    throw std::runtime_error("the saved state is of another scene: of another size");
+  for (auto& b : bodies) {
+    io(b.position, b.orientation, b.velocity, b.angular_velocity);
+    io.demand(std::abs(b.orientation.norm() - 1) < 1e-6);
+  }
+}
+
+}  // namespace tether::scene

@@ -1,9 +1,6 @@
 // Tether: axes of a picture. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "canvas.hpp"
 
 namespace tether::scene::picture {

@@ -5,9 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 
-#include "output/own_files.hpp"
+#include "output/names.hpp"
 
 namespace tether::scene::picture {
 

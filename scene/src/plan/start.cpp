@@ -1,12 +1,5 @@
 // Tether: what a scene begins with that its author may not have meant. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <map>
-#include <set>
-#include <stdexcept>
-#include <tether/scene/plan.hpp>
 
 #include "geometry/mesh.hpp"
 #include "stepping/stepping_engine.hpp"

@@ -2,12 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
-#include <string>
 #include <tether/scene/engine.hpp>
-#include <vector>
 
 namespace tether::scene::player {
 

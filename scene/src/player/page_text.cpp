@@ -5,9 +5,8 @@
 #include <cctype>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
-#include "output/own_files.hpp"
+#include "output/names.hpp"
 
 namespace tether::scene::player {
 

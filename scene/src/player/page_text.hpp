@@ -28,4 +28,11 @@ std::string data_script(const std::string& id, const nlohmann::json& value);
 std::string base64(const std::vector<float>& values);
 std::string base64(const std::vector<std::int16_t>& values);
 
+/// Made at configuration from the files in `page`.
+extern const std::string_view kStyle, kBody, kScript;
+
+// The page of `tether cost`.
+extern const std::string_view kCostStyle;
+extern const std::string_view kCostScript;
+
 }  // namespace tether::scene::player

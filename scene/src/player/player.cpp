@@ -2,15 +2,11 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <stdexcept>
 #include <tether/scene/player.hpp>
 
 #include "film.hpp"
-#include "output/output_lock.hpp"
-#include "output/output_names.hpp"
-#include "output/whole_file.hpp"
-#include "page_parts.hpp"
+#include "output/files.hpp"
+#include "output/names.hpp"
 #include "page_text.hpp"
 #include "record/formats.hpp"
 #include "scene_data.hpp"

@@ -2,13 +2,10 @@
 // BSD-3-Clause
 #include "scene_data.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "geometry/mesh.hpp"
-#include "joints/list.hpp"
+#include "joints/joint_type.hpp"
 
 namespace tether::scene::player {
 

@@ -2,10 +2,6 @@
 // BSD-3-Clause
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
-#include <tether/scene/scene.hpp>
-#include <vector>
-
 #include "film.hpp"
 
 namespace tether::scene::player {

@@ -5,17 +5,13 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "process/standard_streams.hpp"
 
 namespace tether::scene {
-
-/// Exit codes of `tether`.
-enum ExitCode : int {
-  kGood = 0,
-  kNotMet = 1,   ///< an [[expect]] does not hold, a contact problem is not solved
-  kWrong = 2,    ///< a file, a scene or an option is wrong; nothing was run
-  kFailed = 3,   ///< the run could not go on
-  kSignal = 128  ///< and the number of the signal that ended it, as shells have it
-};
 
 void add_check_command(CLI::App& app, int* status);
 void add_contact_command(CLI::App& app, int* status);
@@ -25,5 +21,17 @@ void add_new_command(CLI::App& app, int* status);
 void add_plan_command(CLI::App& app, int* status);
 void add_run_command(CLI::App& app, int* status);
 void add_sweep_command(CLI::App& app, int* status);
+
+struct Kind {
+  std::string_view name, text;
+};
+
+/// Made at configuration from the files in `kinds`.
+const std::vector<Kind>& kinds();
+
+/// Writes a scene, whole or not at all, and says so; "-" is the standard output. Without `force`
+/// std::invalid_argument where the file is there already, std::runtime_error where it cannot be
+/// written.
+void write_scene_file(const std::string& file, const std::string& text, bool force);
 
 }  // namespace tether::scene

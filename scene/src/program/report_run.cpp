@@ -4,17 +4,35 @@
 #include <fmt/core.h>
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <ctime>
-#include <string>
 #include <tether/scene/plan.hpp>
 #include <tether/scene/words.hpp>
-#include <vector>
 
 #include "commands.hpp"
-#include "program/terminal_text.hpp"
+#include "toml/report.hpp"
 
 namespace tether::scene {
+
+std::string on_terminal(std::string_view text) {
+  std::string out;
+  for (;;) {
+    const std::size_t end = text.find('\n');
+    out += files::printable(text.substr(0, end));
+    if (end == std::string_view::npos) return out;
+    out += '\n';
+    text.remove_prefix(end + 1);
+  }
+}
+
+std::string table_field(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    out += control ? ' ' : c;
+    if (c == '"') out += '"';
+  }
+  return out.find_first_of(",\"") == std::string::npos ? out : '"' + out + '"';
+}
 
 namespace {
 
@@ -68,10 +86,6 @@ std::string subject(const Scene& scene, const Expect& e) {
   if (e.spring >= 0) return scene.springs[static_cast<std::size_t>(e.spring)].name;
   return e.body >= 0 ? scene.bodies[static_cast<std::size_t>(e.body)].name : "";
 }
-
-}  // namespace
-
-namespace {
 
 void print_events(const Summary& s, const Counts& c) {
   fmt::print("  events       at {} times; {} impacts, {} contact problems\n", c.events, c.impacts,

@@ -5,6 +5,14 @@
 
 namespace tether::scene {
 
+// Names of files are those of whoever made the folder: *.toml may hold what a terminal obeys.
+
+/// Lines without what a terminal obeys (files::printable).
+std::string on_terminal(std::string_view text);
+
+/// A field of CSV: quoted where it has to be; control characters become blanks.
+std::string table_field(std::string_view text);
+
 /// Energies, errors and work.
 void print_summary(const Scene& scene, const RunResult& result);
 /// Warnings of what the scene begins with that its author may not have meant.

@@ -3,13 +3,12 @@
 #include <iostream>
 #include <new>
 #include <sstream>
-#include <string>
 
 #include "commands.hpp"
-#include "output/whole_file.hpp"
+#include "output/files.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"
-#include "program/terminal_text.hpp"
+#include "report_run.hpp"
 
 namespace {
 

@@ -1,21 +1,128 @@
 // Tether: a run as a table. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
-#include <optional>
 
 #include "effects/list.hpp"
-#include "output/output_names.hpp"
-#include "output/own_files.hpp"
-#include "record/formats.hpp"
-#include "record/number_at.hpp"
-#include "record/table_recorder.hpp"
+#include "formats.hpp"
+#include "output/files.hpp"
+#include "output/names.hpp"
 
 namespace tether::scene {
 
 namespace {
+
+/// Rows that begin with their time. Throws std::runtime_error where the file cannot be written.
+class LongTable {
+ public:
+  /// `keep(row)`: whether a row of an earlier run of the same head stays; the first one that does
+  /// not ends them.
+  template <class Keep>
+  LongTable(const std::string& file, const std::string& head, bool restarted, Keep keep) {
+    std::size_t kept = 0;
+    std::string line;
+    std::ifstream in;
+    if (restarted && !is_device(file)) in.open(file, std::ios::binary);
+    if (in.is_open() && std::getline(in, line) && line + '\n' == head) {
+      kept = head.size();
+      while (std::getline(in, line) && !in.eof() && keep(line)) kept += line.size() + 1;
+    }
+    rows_ = std::make_unique<RowFile>(file, kept);
+    if (kept == 0) put(head);
+  }
+
+  void put(const std::string& rows) { rows_->put(rows); }
+  void flush() { rows_->flush(); }
+  void keep() { rows_->keep(); }
+  const std::string& file() const { return rows_->name(); }
+
+ private:
+  std::unique_ptr<RowFile> rows_;
+};
+
+class TableRecorder : public Recorder {
+ public:
+  void keep(const Engine&) override { table_.keep(); }
+  void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
+    table_.flush();
+    written.push_back(table_.file());
+  }
+
+ protected:
+  TableRecorder(const Scene& scene, LongTable table) : table_(std::move(table)), scene_(scene) {}
+  /// Its name; empty: none.
+  std::string body(int index) const {
+    return index < 0 ? std::string() : scene_.bodies[static_cast<std::size_t>(index)].name;
+  }
+  std::string joint(int index) const {
+    return index < 0 ? std::string() : scene_.joints[static_cast<std::size_t>(index)].name;
+  }
+
+  LongTable table_;
+
+ private:
+  const Scene& scene_;
+};
+
+/// One row for each contact of each record.
+class ContactRecorder : public TableRecorder {
+ public:
+  ContactRecorder(const std::string& file, const formats::Beginning& run)
+      : TableRecorder(run.scene, LongTable(file, kContactsHead, run.resume.restarted,
+                                           [time = run.resume.time](const std::string& row) {
+                                             return number_at(row, 0) <= time;
+                                           })) {}
+
+  void record(const Engine& engine, const Diagnostics&) override {
+    std::string rows;
+    const auto add3 = [&](const Eigen::Vector3d& v) {
+      rows += fmt::format(",{},{},{}", v.x(), v.y(), v.z());
+    };
+    for (const ContactState& c : engine.contacts()) {
+      rows += fmt::format("{},{},{}", engine.time(), body(c.first), body(c.second));
+      add3(c.point), add3(c.normal);
+      rows += fmt::format(",{},{}", c.gap, c.normal.dot(c.force));
+      add3(c.force), add3(c.slip);
+      rows += '\n';
+    }
+    table_.put(rows);
+  }
+};
+
+class EventRecorder : public TableRecorder {
+ public:
+  // Rows of events that were found before the state was saved stay. A `rest` lies ahead of when it
+  // was found.
+  EventRecorder(const std::string& file, const formats::Beginning& run)
+      : TableRecorder(
+            run.scene,
+            LongTable(file, kEventsHead, run.resume.restarted,
+                      [now = run.now, left = run.resume.events](const std::string& row) mutable {
+                        const bool before =
+                            !(number_at(row, 0) > now) || row.find(",rest,") != std::string::npos;
+                        return before && left-- > 0;
+                      })) {}
+
+  void record(const Engine& engine, const Diagnostics&) override { put_found(engine); }
+  void keep(const Engine& engine) override {
+    put_found(engine);
+    TableRecorder::keep(engine);
+  }
+
+ private:
+  void put_found(const Engine& engine) {
+    const std::vector<ContactEvent>& all = engine.events();
+    for (; next_ < all.size(); ++next_) {
+      const ContactEvent& e = all[next_];
+      table_.put(fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", e.time, name(e.kind),
+                             body(e.first), body(e.second), e.before, e.after, e.lost,
+                             e.impulse.x(), e.impulse.y(), e.impulse.z(), joint(e.joint)));
+    }
+  }
+
+  std::size_t next_ = 0;
+};
 
 /// The table has the first of them: a million columns are of no use.
 constexpr std::size_t kMostBodies = 200;
@@ -111,9 +218,10 @@ std::string contacts_of(const std::string& csv) {
 
 void add_tables(const std::string& csv, const formats::Beginning& run, formats::Recorders& out) {
   out.push_back(std::make_unique<CsvRecorder>(csv, run));
-  if (run.plan.engine == EngineKind::event) out.push_back(make_event_recorder(events_of(csv), run));
+  if (run.plan.engine == EngineKind::event)
+    out.push_back(std::make_unique<EventRecorder>(events_of(csv), run));
   if (run.scene.output.forces && !run.scene.pairs.empty())
-    out.push_back(make_contact_recorder(contacts_of(csv), run));
+    out.push_back(std::make_unique<ContactRecorder>(contacts_of(csv), run));
 }
 
 }  // namespace

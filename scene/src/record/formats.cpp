@@ -4,11 +4,8 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <map>
-#include <stdexcept>
 
-#include "output/output_names.hpp"
-#include "output/own_files.hpp"
+#include "output/names.hpp"
 
 namespace tether::scene::formats {
 

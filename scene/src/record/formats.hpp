@@ -1,16 +1,34 @@
 // Tether: the formats in which a run is recorded. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
-#include <string>
-#include <tether/export.hpp>
+#include <charconv>
 #include <tether/scene/plan.hpp>
-#include <tether/scene/scene.hpp>
-#include <vector>
+#include <tether/scene/run.hpp>
 
-#include "recorder.hpp"
+namespace tether::scene {
+
+/// Start of a continued run: recorders keep their output up to then and drop later parts.
+struct Resume {
+  bool restarted = false;
+  double time = 0;           // s, of the last record that a run in one piece has, too
+  std::uint64_t events = 0;  // found until the state was saved
+};
+
+class Recorder {
+ public:
+  virtual ~Recorder() = default;
+  virtual void record(const Engine& engine, const Diagnostics& diagnostics) = 0;
+  /// With a saved state: what was recorded outlasts a crash, so that a run that goes on from the
+  /// state leaves the files of an undisturbed one.
+  virtual void keep(const Engine&) {}
+  /// The run is over; says which files there are and what went wrong.
+  virtual void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) = 0;
+};
+
+}  // namespace tether::scene
 
 TETHER_EXPORT_BEGIN
+
 namespace tether::scene::formats {
 
 /// The present of a run whose recorders begin.
@@ -55,4 +73,16 @@ std::vector<std::string> all_names(const Output& output);
 void check_replaceable(const Output& output);
 
 }  // namespace tether::scene::formats
+
 TETHER_EXPORT_END
+
+namespace tether::scene {
+
+/// The number that begins at a place of a line, the same in every locale; NaN: there is none.
+inline double number_at(const std::string& line, std::size_t place) {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  if (place < line.size()) std::from_chars(line.data() + place, line.data() + line.size(), value);
+  return value;
+}
+
+}  // namespace tether::scene

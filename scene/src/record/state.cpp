@@ -1,5 +1,5 @@
 // Tether: the saved state as an output; the run writes it. SPDX-License-Identifier: BSD-3-Clause
-#include "record/formats.hpp"
+#include "formats.hpp"
 
 namespace tether::scene::formats {
 

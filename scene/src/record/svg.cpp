@@ -1,13 +1,12 @@
 // Tether: a run as a picture: the scene at its start and end with the paths between, its energies
 // and its errors over time. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "output/whole_file.hpp"
+#include "formats.hpp"
+#include "output/files.hpp"
 #include "picture/axes.hpp"
 #include "picture/scene_drawing.hpp"
-#include "record/formats.hpp"
 
 namespace tether::scene {
 

@@ -2,16 +2,30 @@
 #include "judge.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <stdexcept>
 
 #include "output/binary.hpp"
-#include "schedule.hpp"
 
 namespace tether::scene {
 
 namespace {
+
+/// k * every, k = 1, 2, ..., up to the end (to rounding).
+std::vector<double> multiples(double every, double end) {
+  std::vector<double> times;
+  const double count = end / every * (1 + 1e-12);
+  for (long k = 1; static_cast<double>(k) <= count; ++k)
+    times.push_back(static_cast<double>(k) * every);
+  return times;
+}
+
+void merge(const Event& from, Event& into) {
+  if (from.record && !into.record) into.time = from.time;
+  into.record = into.record || from.record;
+  into.expect = into.expect || from.expect;
+  into.checkpoint = into.checkpoint || from.checkpoint;
+  into.stop = into.stop || from.stop;
+  into.end = into.end || from.end;
+}
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -66,7 +80,44 @@ double contact_slip(const Expect& expect, const Engine& engine) {
   return most;
 }
 
+void exchange(binary::Archive io, std::vector<Judgement>& all, std::vector<double>& excess) {
+  std::size_t k = 0;
+  io.list(all, [&](Judgement& j) {
+    if (io.reads()) excess.emplace_back();
+    io(j.judged, j.met, j.time, j.error, excess[k++]);
+    io.list(j.value, [&](double& x) { io(x); });
+    io.demand(j.value.size() <= 4);
+  });
+}
+
 }  // namespace
+
+std::vector<Event> schedule(const Scene& scene, const std::vector<double>& stops) {
+  std::vector<Event> all;
+  const auto add = [&](double time, bool Event::*reason) {
+    if (!(time > 0) || (time > scene.end && !same_time(time, scene.end))) return;
+    Event event;
+    event.time = time;
+    event.*reason = true;
+    all.push_back(event);
+  };
+  const double every = scene.output.every > 0 ? scene.output.every : scene.end / 1000;
+  for (const double t : multiples(every, scene.end)) add(t, &Event::record);
+  if (scene.output.checkpoint > 0)
+    for (const double t : multiples(scene.output.checkpoint, scene.end)) add(t, &Event::checkpoint);
+  for (const Expect& expect : scene.expect) add(expect.time, &Event::expect);
+  for (const double t : stops) add(t, &Event::stop);
+  add(scene.end, &Event::end);
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Event& a, const Event& b) { return a.time < b.time; });
+  std::vector<Event> merged;
+  for (const Event& event : all)
+    if (merged.empty() || !same_time(merged.back().time, event.time))
+      merged.push_back(event);
+    else
+      merge(event, merged.back());
+  return merged;
+}
 
 std::vector<double> measure(const Scene& scene, const Expect& expect, const Engine& engine,
                             double start_energy) {
@@ -162,20 +213,6 @@ void Judge::look(double event, bool record, const Engine& engine, double start_e
     judgement.met = judgement.judged && excess_[i] <= 0;
   }
 }
-
-namespace {
-
-void exchange(binary::Archive io, std::vector<Judgement>& all, std::vector<double>& excess) {
-  std::size_t k = 0;
-  io.list(all, [&](Judgement& j) {
-    if (io.reads()) excess.emplace_back();
-    io(j.judged, j.met, j.time, j.error, excess[k++]);
-    io.list(j.value, [&](double& x) { io(x); });
-    io.demand(j.value.size() <= 4);
-  });
-}
-
-}  // namespace
 
 void Judge::save(std::ostream& out) const {
   std::vector<Judgement> all = judgements_;

@@ -1,11 +1,29 @@
 // Tether: holds a run against the expectations of its scene. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <iosfwd>
+#include <cmath>
 #include <tether/scene/run.hpp>
-#include <vector>
 
 namespace tether::scene {
+
+/// One time, for one or several reasons.
+struct Event {
+  double time = 0;          // s
+  bool record = false;      // on the grid of Output::every
+  bool expect = false;      // of an [[expect]]
+  bool checkpoint = false;  // on the grid of Output::checkpoint
+  bool stop = false;        // of RunOptions::stops
+  bool end = false;
+};
+
+/// 3 * 0.1 and 0.3 are one time.
+inline bool same_time(double a, double b) {
+  return std::abs(a - b) <= 1e-12 * std::fmax(std::abs(a), std::abs(b));
+}
+
+/// In order, after t = 0. Times that are the same but for rounding are one event, with the digits
+/// of the grid of records: so it has them in a run that goes on behind this end, too.
+std::vector<Event> schedule(const Scene& scene, const std::vector<double>& stops);
 
 class Judge {
  public:

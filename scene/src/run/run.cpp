@@ -1,22 +1,14 @@
 // Tether: runs a scene. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <ctime>
-#include <optional>
 #include <sstream>
-#include <tether/scene/plan.hpp>
-#include <tether/scene/run.hpp>
 
 #include "judge.hpp"
 #include "output/binary.hpp"
-#include "output/output_lock.hpp"
-#include "output/output_names.hpp"
-#include "output/whole_file.hpp"
+#include "output/files.hpp"
+#include "output/names.hpp"
 #include "record/formats.hpp"
 #include "saved_state.hpp"
-#include "schedule.hpp"
 #include "stepping/stepping_engine.hpp"
 
 namespace tether::scene {

@@ -5,17 +5,13 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <sstream>
-#include <stdexcept>
-#include <string_view>
 #include <tether/scene/files.hpp>
-#include <tether/scene/plan.hpp>
 
 #include "output/binary.hpp"
-#include "output/own_files.hpp"
-#include "output/whole_file.hpp"
+#include "output/files.hpp"
+#include "output/names.hpp"
 
 namespace tether::scene {
 
@@ -40,13 +36,6 @@ std::uint32_t crc32(std::string_view bytes) {
   for (const char byte : bytes) c = table[(c ^ static_cast<unsigned char>(byte)) & 0xff] ^ (c >> 8);
   return c ^ 0xffffffffu;
 }
-
-struct Open {
-  int descriptor;
-  ~Open() {
-    if (descriptor >= 0) close(descriptor);
-  }
-};
 
 // Without blocking: a pipe may never have a writer, and the first signal is only noted.
 std::string all_of(const std::string& file, const std::function<bool()>& interrupted) {
@@ -97,10 +86,7 @@ std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan) {
     moving.stepping->threads = 1;
     moving.stepping->on_failure = OnFailure::stop;
   }
-  std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a
-  for (const char c : write_scene(moving))
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return hash;
+  return binary::hash_of(write_scene(moving));
 }
 
 void write_state(const std::string& file, std::uint64_t scene, const std::string& content) {

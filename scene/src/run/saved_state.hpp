@@ -9,12 +9,7 @@
 // Numbers in the order of bytes of the machine: a state is for going on, not for exchange.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-#include <stdexcept>
-#include <string>
 #include <tether/scene/plan.hpp>
-#include <tether/scene/scene.hpp>
 
 namespace tether::scene {
 

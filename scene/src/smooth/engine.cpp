@@ -1,16 +1,9 @@
 // Tether: the engine of scenes without contact. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <istream>
-#include <limits>
-#include <ostream>
 
 #include "effects/list.hpp"
-#include "effects/periods.hpp"
+#include "effects/numbers.hpp"
 #include "integrator.hpp"
-#include "mechanics/placed_bodies.hpp"
+#include "mechanics/bodies.hpp"
 #include "output/binary.hpp"
 #include "units.hpp"
 
@@ -100,7 +93,7 @@ class SmoothEngine : public Engine {
 
   Counts counts() const override {
     Counts sum = before_;
-    add_work(sum, integrator_->counts());
+    sum += integrator_->counts();
     return sum;
   }
 
@@ -129,9 +122,7 @@ class SmoothEngine : public Engine {
   }
 
   void restore(std::istream& in, Restore how) override {
-    binary::Magic magic;
-    in.read(magic, sizeof magic);
-    if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
+    if (!binary::begins(in, kMagic))
       throw std::runtime_error("this is not a state of the smooth engine");
     double from = 0, to = 0;
     Eigen::VectorXd y(y_.size()), saved(y_.size());

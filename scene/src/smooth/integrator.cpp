@@ -2,12 +2,7 @@
 // BSD-3-Clause
 #include "integrator.hpp"
 
-#include <fmt/format.h>
 #include <sunlinsol/sunlinsol_spgmr.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace tether::scene::smooth {
 

@@ -2,11 +2,6 @@
 // BSD-3-Clause
 #pragma once
 
-#include <functional>
-#include <optional>
-#include <string>
-#include <tether/ida_projection.hpp>
-
 #include "newton_matrix.hpp"
 #include "sundials/ida_session.hpp"
 #include "system.hpp"

@@ -6,6 +6,18 @@
 
 namespace tether::scene::smooth {
 
+/// Which unknown comes when, for little fill and pivots on the diagonal. First the coordinates of
+/// all bodies: of their columns, pivots cj I, only the velocities of the same body are filled, and
+/// what is left has half the width. Then velocities, bodies in approximate minimum degree order of
+/// the graph that joints and springs make of them, each multiplier behind the later of its bodies
+/// (there its pivot, -G M^-1 G^T less what multipliers before it have of that, is not zero);
+/// whatever else there is behind all.
+///
+/// `places`: (row, column) of each entry, `width` unknowns for each of so many bodies first, of
+/// each the `coordinates` before the rest.
+std::vector<int> elimination_order(int unknowns, int bodies, int width, int coordinates,
+                                   const std::vector<std::pair<int, int>>& places);
+
 /// dF/dy + cj dF/dy' of a system: dense, or sparse with KLU where there are many unknowns. The
 /// assembly writes whole blocks, of which more than half may be zero for all states (a ball joint's
 /// force does not turn with its bodies); the sparse pattern has what is not zero at states about

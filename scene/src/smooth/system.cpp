@@ -1,10 +1,8 @@
 // Tether: unknowns and state of a smooth scene. SPDX-License-Identifier: BSD-3-Clause
 #include "system.hpp"
 
-#include <algorithm>
-
 #include "effects/list.hpp"
-#include "mechanics/quaternions.hpp"
+#include "mechanics/frames.hpp"
 
 namespace tether::scene::smooth {
 
@@ -122,6 +120,206 @@ scene::Forces System::forces(double t, const double* y, const joints::Reactions&
   out.joints = reactions.find(rows_, bodies_.all(), dynamics_.multipliers().data());
   for (const auto& force : forces_) force->report(bodies_.all(), out);
   return out;
+}
+
+int System::constraint_count() const {
+  return 2 * in_use_.count() + moving() + invariants_.count();
+}
+
+void System::joint_values(double t, const double* y, double* g) {
+  update(t, y);
+  rows_.values<0>(bodies_.all(), g);
+  rows_.values<1>(bodies_.all(), g + rows());
+}
+
+void System::constraint_values(double t, const double* y, double* g) {
+  row_values(t, y, g);
+  if (invariants_.count() > 0) invariants_.values(t, y, g + first_invariant());
+}
+
+// Rows of joints on positions, on velocities, and norms of quaternions.
+void System::row_values(double t, const double* y, double* g) {
+  joint_values(t, y, joint_values_.data());
+  const int p = in_use_.count();
+  for (int k = 0; k < p; ++k) {
+    const int row = in_use_.used()[at(k)];
+    const bool kept = in_use_.keeps(row);
+    g[k] = kept ? joint_values_[row] : 0.0;
+    g[p + k] = kept ? joint_values_[rows() + row] : 0.0;
+  }
+  double* norms = g + 2 * p;
+  for (int k = 0; k < moving(); ++k)
+    norms[k] =
+        0.5 * (Eigen::Map<const Eigen::Vector4d>(y + kBody * k + kQuaternion).squaredNorm() - 1.0);
+}
+
+// `entries(row, slot, place)`: where the derivatives by the coordinates of body `slot` begin, from
+// its position on; `place`: among the moving bodies of the row.
+template <class Place>
+void System::row_jacobian(double t, const double* y, const Place& entries) {
+  update(t, y);
+  bodies_.set_turns(y);
+  const Bodies& bodies = bodies_.all();
+  const int p = in_use_.count();
+  const auto put = [&](int row, const Inertia& inertia, int place, const Derivatives& d,
+                       int first) {
+    if (inertia.slot < 0) return;
+    double* to = entries(row, inertia.slot, place);
+    Eigen::Map<Eigen::RowVector3d>(to + kPosition) += d.segment<3>(first);
+    Eigen::Map<Eigen::RowVector4d>(to + kQuaternion) +=
+        d.segment<3>(first + 3).transpose() * bodies.turns[at(inertia.slot)];
+    if (row < p) return;  // no velocities in rows on positions
+    Eigen::Map<Eigen::Matrix<double, 1, 6>>(to + kVelocity) += d.segment<6>(first + 6);
+  };
+  rows_.each([&](const auto& row) {
+    const Inertia &ia = bodies.inertia[at(row.first)], &ib = bodies.inertia[at(row.second)];
+    const Frame<Dual> A = seed(bodies.frames[at(row.first)], ia.slot >= 0, 0);
+    const Frame<Dual> B = seed(bodies.frames[at(row.second)], ib.slot >= 0, kBodyDirections);
+    Dual g[3], rate[3];
+    row.template rows<0>(A, B, g);
+    row.template rows<1>(A, B, rate);
+    for (int i = 0; i < row.count; ++i) {
+      const int place = in_use_.place_of(row.row + i);
+      if (!in_use_.keeps(row.row + i)) continue;
+      put(place, ia, row.place_first, g[i].derivatives(), 0);
+      put(place, ib, row.place_second, g[i].derivatives(), kBodyDirections);
+      put(p + place, ia, row.place_first, rate[i].derivatives(), 0);
+      put(p + place, ib, row.place_second, rate[i].derivatives(), kBodyDirections);
+    }
+  });
+  for (int k = 0; k < moving(); ++k)
+    Eigen::Map<Eigen::RowVector4d>(entries(2 * p + k, k, 0) + kQuaternion) =
+        Eigen::Map<const Eigen::RowVector4d>(y + kBody * k + kQuaternion);
+}
+
+void System::constraint_jacobian(double t, const double* y, ConstraintRows C) {
+  row_jacobian(t, y, [&](int row, int slot, int) { return &C(row, kBody * slot); });
+  const int p = in_use_.count();
+  for (int k = 0; k < p; ++k) {
+    const int place = in_use_.place_of(in_use_.used()[at(k)]);
+    if (place == k) continue;
+    C.row(k) = C.row(place);
+    C.row(p + k) = C.row(p + place);
+  }
+  if (invariants_.count() > 0) invariants_.jacobian(C, first_invariant());
+}
+
+// The same rows with their entries only. A row on positions has a body's position and quaternion,
+// one on velocities its velocity, too, which come one after the other in y.
+ida_projection::SparseJacobian System::sparse_row_jacobian() {
+  const int p = in_use_.count();
+  std::vector<std::vector<int>> slots(at(first_invariant()));
+  rows_.each([&](const auto& row) {
+    for (int i = 0; i < row.count; ++i)
+      for (const int body : {row.first, row.second}) {
+        const int slot = bodies_.all().inertia[at(body)].slot;
+        if (slot < 0) continue;
+        slots[at(row.row + i)].push_back(slot);
+        slots[at(p + row.row + i)].push_back(slot);
+      }
+  });
+  for (int k = 0; k < moving(); ++k) slots[at(2 * p + k)] = {k};
+  const auto width = [p](int row) { return row < p || row >= 2 * p ? int{kVelocity} : int{kBody}; };
+  ida_projection::SparseJacobian jacobian;
+  jacobian.starts.push_back(0);
+  for (int row = 0; row < first_invariant(); ++row) {
+    std::sort(slots[at(row)].begin(), slots[at(row)].end());
+    slots[at(row)].erase(std::unique(slots[at(row)].begin(), slots[at(row)].end()),
+                         slots[at(row)].end());
+    for (const int slot : slots[at(row)])
+      for (int j = 0; j < width(row); ++j) jacobian.columns.push_back(kBody * slot + j);
+    jacobian.starts.push_back(static_cast<int>(jacobian.columns.size()));
+  }
+  jacobian.fill = [this, width, starts = jacobian.starts](double t, ida_projection::ConstVector y,
+                                                          ida_projection::Vector entries) {
+    row_jacobian(t, y.data(), [&](int row, int, int place) {
+      return entries.data() + starts[at(row)] + place * width(row);
+    });
+  };
+  return jacobian;
+}
+
+std::vector<std::string> System::constraint_names() const {
+  const int p = in_use_.count();
+  std::vector<std::string> names(at(2 * p));
+  rows_.each([&](const auto& row) {
+    for (int i = 0; i < row.count; ++i) {
+      const int place = in_use_.place_of(row.row + i);
+      if (place < 0) continue;
+      names[at(place)] = "position of joint \"" + rows_.name(row.joint) + "\"";
+      names[at(p + place)] = "velocity of joint \"" + rows_.name(row.joint) + "\"";
+    }
+  });
+  for (int k = 0; k < moving(); ++k) names.emplace_back("quaternion norm");
+  invariants_.add_names(names);
+  return names;
+}
+
+ida_projection::Constraints System::constraints() {
+  return in_use_.in_place() ? sparse_constraints() : dense_constraints();
+}
+
+ida_projection::Constraints System::dense_constraints() {
+  ida_projection::Constraints all;
+  all.count = constraint_count();
+  all.names = constraint_names();
+  all.value = [this](double t, ida_projection::ConstVector y, ida_projection::Vector g) {
+    constraint_values(t, y.data(), g.data());
+  };
+  all.jacobian = ida_projection::DenseJacobian(
+      [this](double t, ida_projection::ConstVector y, ida_projection::Matrix C) {
+        constraint_jacobian(t, y.data(), ConstraintRows(C.data(), C.rows(), C.cols()));
+      });
+  return all;
+}
+
+// Invariants are full rows, joined to the others.
+ida_projection::Constraints System::sparse_constraints() {
+  const std::vector<std::string> names = constraint_names();
+  const auto invariant = names.begin() + first_invariant();
+  ida_projection::Constraints joints;
+  joints.count = first_invariant();
+  joints.names.assign(names.begin(), invariant);
+  joints.value = [this](double t, ida_projection::ConstVector y, ida_projection::Vector g) {
+    row_values(t, y.data(), g.data());
+  };
+  joints.jacobian = sparse_row_jacobian();
+  if (invariants_.count() == 0) return joints;
+  ida_projection::Constraints kept;
+  kept.count = invariants_.count();
+  kept.names.assign(invariant, names.end());
+  kept.value = [this](double t, ida_projection::ConstVector y, ida_projection::Vector g) {
+    update(t, y.data());
+    invariants_.values(t, y.data(), g.data());
+  };
+  kept.jacobian = ida_projection::DenseJacobian(
+      [this](double t, ida_projection::ConstVector y, ida_projection::Matrix C) {
+        update(t, y.data());
+        bodies_.set_turns(y.data());
+        invariants_.jacobian(ConstraintRows(C.data(), C.rows(), C.cols()), 0);
+      });
+  return joints + kept;
+}
+
+// Largest drift of rows with different units, in SI.
+double System::drift(double t, const double* y) {
+  Eigen::VectorXd g(constraint_count());
+  constraint_values(t, y, g.data());
+  double largest = 0;
+  const auto take = [&](double value, double unit) {
+    largest = std::max(largest, std::abs(value) * unit);
+  };
+  rows_.each([&](const auto& row) {
+    const double length = row.has_length ? units_.length : 1;
+    for (int i = 0; i < row.count; ++i) {
+      take(joint_values_[row.row + i], length);
+      take(joint_values_[rows() + row.row + i], length / units_.time);
+    }
+  });
+  int k = 2 * in_use_.count();
+  for (const int end = k + moving(); k < end; ++k) take(g[k], 1);
+  for (const double unit : invariants_.units(units_)) take(g[k++], unit);
+  return largest;
 }
 
 }  // namespace tether::scene::smooth

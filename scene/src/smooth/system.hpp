@@ -16,24 +16,34 @@
 // power).
 #pragma once
 
-#include <algorithm>
-#include <limits>
-#include <memory>
-#include <string>
+#include <chrono>
 #include <tether/ida_projection.hpp>
-#include <tether/scene/engine.hpp>
-#include <tether/scene/scene.hpp>
-#include <vector>
 
-#include "joints/laws/reactions.hpp"
+#include "joints/joint_rows.hpp"
 #include "smooth/rows/rows_in_use.hpp"
-#include "smooth/terms/acceleration_jacobian.hpp"
 #include "smooth/terms/forward_dynamics.hpp"
 #include "smooth/terms/jacobian_terms.hpp"
 #include "smooth/terms/kept_invariants.hpp"
-#include "stopwatch.hpp"
 
 namespace tether::scene::smooth {
+
+/// Seconds for each of a few parts. A null pointer in its place measures nothing.
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::size_t parts) : seconds(parts, 0.0) {}
+  std::vector<double> seconds;
+
+  void start() { last_ = Clock::now(); }
+  void lap(std::size_t part) {
+    const Clock::time_point now = Clock::now();
+    seconds[part] += std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point last_;
+};
 
 class System {
  public:

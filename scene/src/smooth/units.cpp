@@ -1,10 +1,8 @@
 // Tether: units in which the numbers of a scene are near 1. SPDX-License-Identifier: BSD-3-Clause
 #include "units.hpp"
 
-#include <cmath>
-
 #include "effects/list.hpp"
-#include "joints/list.hpp"
+#include "joints/joint_type.hpp"
 
 namespace tether::scene::smooth {
 

@@ -2,10 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stepped_joints.hpp"
 
-#include <algorithm>
-#include <type_traits>
-#include <utility>
-
 namespace tether::scene::stepping {
 
 using namespace mechanics;

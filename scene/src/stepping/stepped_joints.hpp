@@ -2,16 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-#include <tether/contact/joint_equations.hpp>
-#include <tether/contact/stepping.hpp>
-#include <tether/scene/scene.hpp>
-#include <vector>
-
+#include "joints/joint_laws.hpp"
 #include "joints/joint_rows.hpp"
-#include "joints/laws/joint_laws.hpp"
-#include "joints/laws/reactions.hpp"
-#include "mechanics/stepped_bodies.hpp"
+#include "mechanics/force.hpp"
 
 namespace tether::scene::stepping {
 

@@ -1,48 +1,120 @@
 // Tether: the engine that steps with impulses. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping_engine.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <istream>
-#include <limits>
-#include <ostream>
-#include <stdexcept>
 #include <tether/scene/run.hpp>
-#include <utility>
 
+#include "effects/list.hpp"
 #include "output/binary.hpp"
-#include "output/saved_bodies.hpp"
-#include "saved_memory.hpp"
 
 namespace tether::scene::stepping {
 
+using binary::Archive;
+using contact::StepperMemory;
 using Eigen::Vector3d;
 
 namespace {
+
+void refuse(const Scene& scene) {
+  for (const Invariant& each : scene.invariants)
+    if (each.project)
+      throw std::invalid_argument(
+          "the stepping engine projects no invariants: give them project = false, or, without "
+          "contacts, use the smooth engine");
+}
+
+// Materials that no pair names get none, so that their bodies have no surfaces at all.
+std::map<std::string, int> materials(const Scene& scene) {
+  std::map<std::string, int> index;
+  for (const Pair& pair : scene.pairs) {
+    if (!pair.touch) continue;
+    index.emplace(pair.first, static_cast<int>(index.size()));
+    index.emplace(pair.second, static_cast<int>(index.size()));
+  }
+  return index;
+}
+
+void exchange(Archive& io, contact::WarmStart& start) {
+  std::size_t k = 0;
+  io.list(start.ids, [&](std::uint64_t& id) {
+    if (io.reads()) start.impulses.emplace_back();
+    io(id, start.impulses[k++]);
+  });
+}
+
+void exchange(Archive& io, int bodies, contact::StepContacts& contacts) {
+  std::size_t k = 0;
+  io.list(contacts.points, [&](contact::PointContact& c) {
+    if (io.reads()) {
+      contacts.gaps.emplace_back();
+      contacts.impulses.emplace_back();
+    }
+    io(c.first, c.second, c.mu, c.bias, c.id, c.r1, c.r2, c.normal);
+    io(contacts.gaps[k], contacts.impulses[k]);
+    io.demand(std::isfinite(c.mu) && std::isfinite(c.bias) && std::isfinite(contacts.gaps[k]),
+              "a number in it is not finite");
+    io.demand(c.first >= 0 && c.first < bodies && c.second >= -1 && c.second < bodies,
+              "it has contacts of no bodies");
+    ++k;
+  });
+}
+
+// Whether they fit the bodies is looked at by the stepper.
+void exchange(Archive& io, int bodies, StepperMemory::Sleep& sleep) {
+  io.list(sleep.bodies, [&](StepperMemory::Rest& r) {
+    io(r.slow, r.island, r.fresh, r.acceleration, r.angular_acceleration);
+    io.demand(std::isfinite(r.slow), "a number in it is not finite");
+  });
+  exchange(io, bodies, sleep.contacts);
+  io.list(sleep.neighbours, [&](StepperMemory::Neighbour& n) {
+    io(n.body, n.island, n.position, n.orientation, n.velocity, n.angular_velocity);
+  });
+}
 
 contact::Stepper make_stepper(Mapped mapped) {
   return contact::Stepper(std::move(mapped.bodies), std::move(mapped.surfaces),
                           std::move(mapped.meetings), mapped.options);
 }
 
-// FNV-1a over what a state cannot do without: the same bodies and step. Whether the rest of the
-// scene is the same is looked at by who keeps the file.
-std::uint64_t fingerprint(const Scene& scene, double step) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  const auto add = [&](const void* data, std::size_t size) {
-    const auto* byte = static_cast<const unsigned char*>(data);
-    for (std::size_t k = 0; k < size; ++k) hash = (hash ^ byte[k]) * 0x100000001b3u;
+/// Throws std::runtime_error on a memory that no stepper of so many bodies has written.
+void exchange(Archive& io, int bodies, StepperMemory& m) {
+  const auto demand_not_negative = [&](std::initializer_list<double> numbers, const char* why) {
+    for (const double x : numbers) io.demand(x >= 0 && std::isfinite(x), why);
   };
-  add(&step, sizeof step);
+  io(m.steps);
+  io.demand(m.steps >= 0, "it has no time");
+  for (contact::WarmStart* each : {&m.contacts, &m.corrections, &m.bounces}) exchange(io, *each);
+  io.list(m.spins, [&](StepperMemory::Spin& spin) {
+    Eigen::Map<Eigen::Vector4d> orientation(spin.orientation.data());
+    io(spin.momentum, spin.angular_velocity, orientation);
+  });
+  exchange(io, bodies, m.last);
+  io(m.penetration, m.residual, m.status);
+  io.demand(contact::name(m.status) != std::string_view("?"), "no contact problem ends so");
+  StepperMemory::Control& control = m.control;
+  io(control.next, control.last, control.error, control.length);
+  demand_not_negative({control.next, control.last, control.error, control.length},
+                      "no part of a step is so long");
+  io(m.drift, m.vibration.frequency, m.vibration.acceleration);
+  demand_not_negative({m.drift}, "joints are off by no length");
+  demand_not_negative({m.vibration.frequency, m.vibration.acceleration},
+                      "joints vibrate at no frequency");
+  io.list(m.vibration.mode, [&](contact::Vector6d& v) { io(v); });
+  exchange(io, bodies, m.sleep);
+  io(m.cuts);
+  demand_not_negative({m.cuts}, "steps are cut at no impacts");
+}
+
+// Of what a state cannot do without: the same bodies and step. Whether the rest of the scene is the
+// same is looked at by who keeps the file.
+std::uint64_t fingerprint(const Scene& scene, double step) {
+  std::string text(reinterpret_cast<const char*>(&step), sizeof step);
   for (const Body& body : scene.bodies) {
-    add(body.name.data(), body.name.size() + 1);
     const double mass = body.fixed ? 0 : body.mass;
-    add(&mass, sizeof mass);
+    text.append(body.name.c_str(), body.name.size() + 1);
+    text.append(reinterpret_cast<const char*>(&mass), sizeof mass);
   }
-  return hash;
+  return binary::hash_of(text);
 }
 
 // Velocity of the point at r from the centre of a body; -1: the world.
@@ -64,6 +136,42 @@ Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
 }
 
 }  // namespace
+
+Mapped map_scene(const Scene& scene) {
+  refuse(scene);
+  Mapped out;
+  const std::map<std::string, int> material = materials(scene);
+  for (const Body& body : scene.bodies) {
+    const std::string where = "body \"" + body.name + "\": ";
+    int index = 0;
+    try {
+      index = body.fixed ? out.bodies.add_fixed(body.position, body.orientation)
+                         : out.bodies.add(body.mass, body.inertia, body.position, body.orientation,
+                                          body.velocity, body.angular_velocity);
+    } catch (const std::invalid_argument& problem) {
+      throw std::invalid_argument(where + problem.what());
+    }
+    const auto found = material.find(body.material);
+    if (found == material.end()) continue;
+    const SurfaceSpeed speed = body.surface.value_or(SurfaceSpeed{});
+    for (const Shape& shape : body.shapes)
+      out.surfaces.push_back({index, shape, found->second, speed.velocity, speed.angular_velocity});
+  }
+  for (const Pair& pair : scene.pairs) {
+    if (!pair.touch) continue;
+    contact::Meeting meeting;
+    meeting.first = material.at(pair.first);
+    meeting.second = material.at(pair.second);
+    for (const effects::Effect* each : effects::all()) each->configure_pair(pair, meeting);
+    out.meetings.push_back(meeting);
+  }
+
+  out.options = scene.stepping.value_or(SteppingOptions{});
+  out.options.gravity.reset();
+  out.options.simultaneous_impacts = scene.simultaneous_impacts;
+  for (const effects::Effect* each : effects::all()) each->configure(scene, out.options);
+  return out;
+}
 
 SteppingEngine::SteppingEngine(const Scene& scene, contact::SolverTeam* team)
     : SteppingEngine(scene, mapped_for(team, scene)) {}

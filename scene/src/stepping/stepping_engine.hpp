@@ -1,15 +1,20 @@
 // Tether: the engine that steps with impulses. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/contact/stepping.hpp>
-#include <tether/scene/engine.hpp>
-#include <vector>
-
 #include "effects/list.hpp"
-#include "map_scene.hpp"
 #include "stepped_joints.hpp"
 
 namespace tether::scene::stepping {
+
+struct Mapped {
+  contact::BodySet bodies;
+  std::vector<contact::Surface> surfaces;
+  std::vector<contact::Meeting> meetings;
+  contact::SteppingOptions options;
+};
+
+/// Throws std::invalid_argument, naming what the scene asks for and stepping does not have.
+Mapped map_scene(const Scene& scene);
 
 class SteppingEngine final : public Engine {
  public:

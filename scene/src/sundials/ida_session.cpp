@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <new>
-#include <stdexcept>
 
 namespace tether::scene {
 
@@ -94,14 +93,6 @@ Counts IdaSession::counts() const {
   IDAGetNumErrTestFails(ida_, &c.error_test_failures);
   if (projection_) c.projections = projection_->statistics().projections;
   return c;
-}
-
-void add_work(Counts& sum, const Counts& more) {
-  sum.steps += more.steps;
-  sum.residual_evaluations += more.residual_evaluations;
-  sum.jacobian_evaluations += more.jacobian_evaluations;
-  sum.projections += more.projections;
-  sum.error_test_failures += more.error_test_failures;
 }
 
 double FirstStep::operator()(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const {

@@ -1,14 +1,8 @@
 // Tether: a state in the hands of IDA and the projection. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <ida/ida.h>
 #include <nvector/nvector_serial.h>
 
-#include <Eigen/Core>
-#include <functional>
-#include <memory>
-#include <optional>
-#include <string>
 #include <tether/ida_projection.hpp>
 #include <tether/scene/engine.hpp>
 
@@ -78,9 +72,6 @@ class IdaSession {
   void* ida_;
   std::optional<ida_projection::Projection> projection_;
 };
-
-/// Adds the work of an IdaSession.
-void add_work(Counts& sum, const Counts& more);
 
 /// The first step of a state y with y' = yp, whose error is an eighth of what IDA allows: at order
 /// 1 IDA estimates h^2 |y''| / 4. IDA's own depends on the time asked for, and at tight tolerances

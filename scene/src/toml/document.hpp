@@ -1,11 +1,7 @@
 // Tether: a TOML document as plain values with their places. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-#include <string_view>
-#include <tether/scene/scene.hpp>
 #include <variant>
-#include <vector>
 
 #include "report.hpp"
 

@@ -3,10 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <tether/linalg/pi.hpp>
 
 namespace tether::scene::files {

@@ -1,13 +1,8 @@
 // Tether: the fields of one table of a scene file. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <initializer_list>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <tether/scene/words.hpp>
-#include <vector>
 
 #include "document.hpp"
 #include "report.hpp"

@@ -3,11 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <map>
 #include <set>
-#include <string>
-#include <tether/scene/scene.hpp>
-#include <vector>
 
 #include "fields.hpp"
 

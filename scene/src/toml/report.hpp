@@ -2,11 +2,8 @@
 #pragma once
 
 #include <algorithm>
-#include <string>
-#include <string_view>
 #include <tether/scene/files.hpp>
 #include <tuple>
-#include <vector>
 
 namespace tether::scene::files {
 

@@ -3,13 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <array>
-#include <string>
-#include <string_view>
 #include <tether/scene/words.hpp>
-#include <vector>
 
 namespace tether::scene::files {
 

@@ -115,6 +115,16 @@ struct Counts {
   /// Event engine: times at which something happens, a start with impacts included; contacts that
   /// hit.
   long events = 0, impacts = 0;
+
+  /// f(each number).
+  template <class F>
+  void each(const F& f) {
+    for (long* n :
+         {&steps, &residual_evaluations, &jacobian_evaluations, &projections, &contact_problems,
+          &sweeps, &unsolved, &error_test_failures, &accepted, &halved, &events, &impacts})
+      f(*n);
+  }
+  Counts& operator+=(Counts more);
 };
 
 /// A change of a run from events to steps.

@@ -16,11 +16,9 @@
 #pragma once
 
 #include <variant>
-#include <vector>
 
-#include "crossing.hpp"
-#include "plane_feature.hpp"
 #include "round.hpp"
+#include "touch.hpp"
 
 namespace tether::scene::event {
 

@@ -1,11 +1,8 @@
 // Tether: the features by which a shape touches others. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/scene/scene.hpp>
-#include <vector>
-
-#include "crossing.hpp"
 #include "features.hpp"
+#include "touch.hpp"
 
 namespace tether::scene::event {
 

@@ -3,8 +3,6 @@
 #include "round.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 
 namespace tether::scene::event {
 
@@ -154,6 +152,22 @@ double margin_of_disc(const Frame<double>& f, const Round& disc, const Vector3d&
   return std::min(size * (kFlush + n.dot(f.R * disc.outward)), Support(f, disc).reach(n));
 }
 
+struct OnLine {
+  Vector3d n;
+  double along = 0;
+};
+
+OnLine nearest(const RoundOnLine& pair, const Frame<double>& A, const Frame<double>& B) {
+  const Support s(A, pair.first);
+  const Between between(s, nullptr, pair.line.radius);
+  const Vector3d e = times(B.R, pair.line.along);
+  Jet<double> d = way(mechanics::point<2>(B, pair.line.at), mechanics::point<2>(A, pair.first.at));
+  OnLine out;
+  out.n = between.normal(d, &e, pair.first.size() + pair.line.radius + d.x.norm());
+  out.along = (d.x - s.at(out.n).point).dot(e);
+  return out;
+}
+
 }  // namespace
 
 Touch RoundOnPlane::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
@@ -205,26 +219,6 @@ double RoundOnRound::margin(const Frame<double>& A, const Frame<double>& B,
   const Vector3d n = look(A, B, centre, 0).normal;
   return std::min(margin_of_disc(A, first, -n), margin_of_disc(B, second, n));
 }
-
-namespace {
-
-struct OnLine {
-  Vector3d n;
-  double along = 0;
-};
-
-OnLine nearest(const RoundOnLine& pair, const Frame<double>& A, const Frame<double>& B) {
-  const Support s(A, pair.first);
-  const Between between(s, nullptr, pair.line.radius);
-  const Vector3d e = times(B.R, pair.line.along);
-  Jet<double> d = way(mechanics::point<2>(B, pair.line.at), mechanics::point<2>(A, pair.first.at));
-  OnLine out;
-  out.n = between.normal(d, &e, pair.first.size() + pair.line.radius + d.x.norm());
-  out.along = (d.x - s.at(out.n).point).dot(e);
-  return out;
-}
-
-}  // namespace
 
 Touch RoundOnLine::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
                         double) const {

@@ -15,11 +15,73 @@
 //   gap'  = f_t,    gap'' = f_tt + 2 n'.g_t - n'.H n' - c |n'|^2
 #pragma once
 
-#include "crossing.hpp"
-#include "plane_feature.hpp"
-#include "support.hpp"
+#include "touch.hpp"
 
 namespace tether::scene::event {
+
+// The points at + shape v, |v| <= 1, with a ball of `radius` around each: an ellipsoid (shape of
+// rank 3), the disc of a cylinder's end (rank 2), a sphere (0). With L the shape in world axes
+//
+//   s(n) = |L' n| + r |n|      the farthest it reaches along n from its centre
+//   ds/dn                      the point that is that far
+//
+// and L' = W x L, L'' = alpha x L + W x L'.
+
+struct Round {
+  Vector3d at = Vector3d::Zero();
+  Matrix3d shape = Matrix3d::Zero();
+  double radius = 0;
+  Vector3d outward = Vector3d::Zero();  ///< of a disc: a unit vector, out of the body; else zero
+
+  bool is_disc() const { return !outward.isZero(0); }
+  double size() const { return shape.norm() + radius; }
+};
+
+/// Support function of a round body whose frame is known, for unit directions n; `_t`: its
+/// derivative by time with n fixed.
+class Support {
+ public:
+  Support(const Frame<double>& f, const Round& of) : L_(f.R * of.shape), radius_(of.radius) {
+    flat_ = kFlat * L_.norm();
+    for (int k = 0; k < 3; ++k) {
+      L1_.col(k) = f.W.cross(L_.col(k));
+      L2_.col(k) = f.alpha.cross(L_.col(k)) + f.W.cross(L1_.col(k));
+    }
+  }
+
+  struct At {
+    double s = 0, s_t = 0, s_tt = 0;
+    Vector3d point = Vector3d::Zero(), point_t = Vector3d::Zero();  ///< from the centre
+    Matrix3d bend = Matrix3d::Zero();                               ///< d point / dn
+  };
+  At at(const Vector3d& n) const {
+    At out;
+    const Vector3d u = L_.transpose() * n;
+    const double e = u.norm();
+    if (e > flat_) {
+      const Vector3d u1 = L1_.transpose() * n, u2 = L2_.transpose() * n;
+      const Vector3d p = L_ * u / e;
+      out.s = e;
+      out.s_t = u.dot(u1) / e;
+      out.s_tt = (u1.squaredNorm() + u.dot(u2) - out.s_t * out.s_t) / e;
+      out.point = p;
+      out.point_t = (L1_ * u + L_ * u1 - p * out.s_t) / e;
+      out.bend = (L_ * L_.transpose() - p * p.transpose()) / e;
+    }
+    out.s += radius_;
+    out.point += radius_ * n;
+    out.bend += radius_ * (Matrix3d::Identity() - n * n.transpose());
+    return out;
+  }
+  /// How far a disc reaches along n, which is nothing along its axis.
+  double reach(const Vector3d& n) const { return (L_.transpose() * n).norm(); }
+
+  static constexpr double kFlat = 1e-9;  // sine below which a disc is flush with what it touches
+
+ private:
+  Matrix3d L_, L1_, L2_;
+  double radius_, flat_ = 0;
+};
 
 /// A round feature of the first body on a plane or face of the second one. A face of a cylinder is
 /// bordered by a circle.

@@ -2,19 +2,44 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
-#include <tether/scene/engine.hpp>
-#include <vector>
-
 #include "features.hpp"
+#include "joints/joint_laws.hpp"
 #include "joints/joint_rows.hpp"
-#include "joints/laws/reactions.hpp"
-#include "law_contacts.hpp"
 #include "mechanics/force.hpp"
 #include "model.hpp"
 #include "smooth/rows/moving_bodies.hpp"
 
 namespace tether::scene::event {
+
+// A limit is a contact without friction: its gap is the way to it. A motor or the friction of a
+// joint is one without a gap that slides where its speed is not the wanted one, against the bound,
+// and sticks where it is, with any force up to the bound. In the parts of a contact (normal,
+// tangents) a limit has the first alone, a bounded law the second.
+
+class LawContacts {
+ public:
+  /// `bodies`: at t = 0. Laws with a bound of 0 are none.
+  LawContacts(const Scene& scene, const mechanics::Bodies& bodies);
+
+  int count() const { return static_cast<int>(list_.size()); }
+  const joints::JointLaws& all() const { return laws_; }
+  int place(int k) const { return at_place(k).law; }  ///< in all()
+  ContactLaw law(int k) const { return at_place(k).of; }
+  double gap(int k, const mechanics::Bodies& bodies, double& rate) const;
+  void look(int k, const mechanics::Bodies& bodies, ContactLook& out) const;
+  Eigen::Vector3d direction(int k, const mechanics::Bodies& bodies) const;
+
+ private:
+  struct Entry {
+    int law;
+    ContactLaw of;
+    double gap_at_zero, wanted;  // of the coordinate; a speed
+  };
+  const Entry& at_place(int k) const { return list_[static_cast<std::size_t>(k)]; }
+
+  joints::JointLaws laws_;
+  std::vector<Entry> list_;
+};
 
 /// Coordinates: x and q (wxyz) of each moving body, by slot. Velocities: v in world axes and w in
 /// body axes.

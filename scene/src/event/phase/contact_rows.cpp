@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tether/linalg/index.hpp>
 
 namespace tether::scene::event {
 

@@ -4,10 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tether/contact/cones.hpp>
-#include <tether/contact/solver.hpp>
-#include <tether/linalg/index.hpp>
 
 namespace tether::scene::event {
 

@@ -2,8 +2,6 @@
 // (method, eq. 7, 8). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <vector>
-
 #include "contact_rows.hpp"
 #include "shared_forces.hpp"
 

@@ -7,12 +7,6 @@
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
-#include <cmath>
-#include <optional>
-#include <string>
-#include <tether/linalg/least_squares.hpp>
-#include <tether/scene/engine.hpp>
-
 #include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
 #include <tether/scene/engine.hpp>
 
 #include "motion.hpp"

@@ -1,9 +1,7 @@
 // Tether: forces of rows, island by island. SPDX-License-Identifier: BSD-3-Clause
 #include "row_islands.hpp"
 
-#include <cmath>
 #include <tether/linalg/disjoint_sets.hpp>
-#include <tether/linalg/index.hpp>
 
 namespace tether::scene::event {
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tether/linalg/index.hpp>
 #include <tether/linalg/least_squares.hpp>
 #include <tether/linalg/pivoted_qr.hpp>
 

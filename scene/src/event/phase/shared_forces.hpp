@@ -7,9 +7,7 @@
 // law allows with them. It is unique, so that what is symmetric stays symmetric.
 #pragma once
 
-#include <Eigen/Core>
 #include <tether/contact/problem.hpp>
-#include <vector>
 
 namespace tether::scene::event {
 

@@ -4,10 +4,6 @@
 #include "event/model/touch.hpp"
 #include "friction_solve.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 namespace tether::scene::event {
 
 namespace {

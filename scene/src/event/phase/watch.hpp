@@ -12,9 +12,6 @@
 // negative within its band at the start counts from there: other contacts pressed it in.
 #pragma once
 
-#include <optional>
-#include <vector>
-
 #include "motion.hpp"
 #include "phase.hpp"
 

@@ -20,9 +20,6 @@ class Ball : public JointType {
 
 }  // namespace
 
-const JointType& ball_joint() {
-  static const Ball joint;
-  return joint;
-}
+TETHER_JOINT(ball, Ball)
 
 }  // namespace tether::scene::joints

@@ -1,7 +1,6 @@
 // Tether: the distance joint. SPDX-License-Identifier: BSD-3-Clause
 //
 // Two points at a distance, which a motion changes; 1 row.
-#include <stdexcept>
 
 #include "joints/joint_type.hpp"
 #include "toml/reader.hpp"
@@ -50,9 +49,6 @@ class DistanceJoint : public JointType {
 
 }  // namespace
 
-const JointType& distance_joint() {
-  static const DistanceJoint joint;
-  return joint;
-}
+TETHER_JOINT(distance, DistanceJoint)
 
 }  // namespace tether::scene::joints

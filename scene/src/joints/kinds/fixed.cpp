@@ -18,9 +18,6 @@ class Fixed : public JointType {
 
 }  // namespace
 
-const JointType& fixed_joint() {
-  static const Fixed joint;
-  return joint;
-}
+TETHER_JOINT(fixed, Fixed)
 
 }  // namespace tether::scene::joints

@@ -29,9 +29,6 @@ class Hinge : public AxisJoint {
 
 }  // namespace
 
-const JointType& hinge_joint() {
-  static const Hinge joint;
-  return joint;
-}
+TETHER_JOINT(hinge, Hinge)
 
 }  // namespace tether::scene::joints

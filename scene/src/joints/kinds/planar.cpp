@@ -19,9 +19,6 @@ class Planar : public AxisJoint {
 
 }  // namespace
 
-const JointType& planar_joint() {
-  static const Planar joint;
-  return joint;
-}
+TETHER_JOINT(planar, Planar)
 
 }  // namespace tether::scene::joints

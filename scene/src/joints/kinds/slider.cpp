@@ -26,9 +26,6 @@ class Slider : public AxisJoint {
 
 }  // namespace
 
-const JointType& slider_joint() {
-  static const Slider joint;
-  return joint;
-}
+TETHER_JOINT(slider, Slider)
 
 }  // namespace tether::scene::joints

@@ -2,8 +2,6 @@
 //
 // A cross joins the bodies: they have its centre in common, and its arms, one fixed in each body,
 // stay at right angles; 4 rows.
-#include <cmath>
-#include <stdexcept>
 
 #include "joints/joint_type.hpp"
 
@@ -52,9 +50,6 @@ class Universal : public JointType {
 
 }  // namespace
 
-const JointType& universal_joint() {
-  static const Universal joint;
-  return joint;
-}
+TETHER_JOINT(universal, Universal)
 
 }  // namespace tether::scene::joints

@@ -1,7 +1,6 @@
 // Tether: friction of joints. SPDX-License-Identifier: BSD-3-Clause
 //
 // Coulomb's law with a given bound, which does not follow the reactions of the joint.
-#include <cmath>
 
 #include "joints/laws/joint_law_effect.hpp"
 
@@ -33,9 +32,6 @@ class JointFrictionEffect : public JointLawEffect {
 
 }  // namespace
 
-const Effect& joint_friction_effect() {
-  static const JointFrictionEffect effect;
-  return effect;
-}
+TETHER_EFFECT(joint_friction, JointFrictionEffect)
 
 }  // namespace tether::scene::effects

@@ -1,9 +1,7 @@
 // Tether: an effect that is a law of some joints. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <algorithm>
-
-#include "joints/list.hpp"
+#include "joints/joint_type.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {

@@ -2,7 +2,6 @@
 //
 // s >= lower, upper >= s, of the angle of a hinge or the way of a slider: impulses that only push
 // away from the limit, s'+ = -e s'- where it is struck.
-#include <cmath>
 #include <tether/linalg/pi.hpp>
 
 #include "joints/laws/joint_law_effect.hpp"
@@ -67,9 +66,6 @@ class JointLimitEffect : public JointLawEffect {
 
 }  // namespace
 
-const Effect& joint_limits_effect() {
-  static const JointLimitEffect effect;
-  return effect;
-}
+TETHER_EFFECT(joint_limits, JointLimitEffect)
 
 }  // namespace tether::scene::effects

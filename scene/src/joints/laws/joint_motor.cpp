@@ -2,8 +2,6 @@
 //
 // The force along the coordinate that makes its speed the wanted one, or the largest one towards
 // it. With gains it follows target + rate t by the law in joint_spring.cpp.
-#include <cmath>
-#include <limits>
 
 #include "joints/laws/joint_law_effect.hpp"
 
@@ -77,9 +75,6 @@ class JointMotorEffect : public JointLawEffect {
 
 }  // namespace
 
-const Effect& joint_motor_effect() {
-  static const JointMotorEffect effect;
-  return effect;
-}
+TETHER_EFFECT(joint_motor, JointMotorEffect)
 
 }  // namespace tether::scene::effects

@@ -13,13 +13,11 @@
 //
 // An angle is the one of its turns that is nearest to its rest or target. Steps take the stretch
 // and the speed of their end (contact::JointLaws), which is stable for all gains.
-#include <cmath>
-#include <limits>
 #include <tether/linalg/pi.hpp>
 
-#include "joints/laws/coordinate.hpp"
+#include "joints/coordinate.hpp"
+#include "joints/joint_laws.hpp"
 #include "joints/laws/joint_law_effect.hpp"
-#include "joints/laws/joint_laws.hpp"
 #include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
@@ -316,9 +314,6 @@ class JointSpringEffect : public JointLawEffect {
 
 }  // namespace
 
-const Effect& joint_spring_effect() {
-  static const JointSpringEffect effect;
-  return effect;
-}
+TETHER_EFFECT(joint_spring, JointSpringEffect)
 
 }  // namespace tether::scene::effects

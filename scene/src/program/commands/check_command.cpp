@@ -1,14 +1,11 @@
 // Tether: `tether check`: is a scene file right? SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/core.h>
 
-#include <memory>
-#include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/report_run.hpp"
-#include "program/scene_text.hpp"
-#include "program/terminal_text.hpp"
 
 namespace tether::scene {
 

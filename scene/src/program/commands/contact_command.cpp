@@ -1,15 +1,11 @@
 // Tether: `tether contact`: solves contact problems in files. SPDX-License-Identifier: BSD-3-Clause
 #include "program/commands.hpp"
-#include "program/terminal_text.hpp"
+#include "program/report_run.hpp"
 
 #include <cstdio>
 #include <filesystem>
-#include <map>
-#include <memory>
-#include <string>
 #include <tether/contact.hpp>
 #include <tether/contact/files.hpp>
-#include <vector>
 
 namespace tether::scene {
 namespace {

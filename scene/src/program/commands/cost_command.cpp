@@ -2,20 +2,15 @@
 #include <fmt/core.h>
 #include <fmt/format.h>
 
-#include <memory>
-#include <optional>
 #include <progress.hpp>
 #include <tether/scene/cost.hpp>
-#include <tether/scene/files.hpp>
-#include <tether/scene/plan.hpp>
 
-#include "output/output_names.hpp"
-#include "output/own_files.hpp"
-#include "output/whole_file.hpp"
+#include "output/files.hpp"
+#include "output/names.hpp"
+#include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
-#include "program/settings.hpp"
-#include "program/terminal_text.hpp"
+#include "program/report_run.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

@@ -6,14 +6,11 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
-#include <memory>
 
 #include "import/import.hpp"
-#include "output/output_names.hpp"
+#include "output/names.hpp"
+#include "program/arguments.hpp"
 #include "program/commands.hpp"
-#include "program/new_file.hpp"
-#include "program/scene_text.hpp"
-#include "program/settings.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

@@ -2,15 +2,12 @@
 #include <fmt/core.h>
 
 #include <iostream>
-#include <memory>
-#include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
-#include <tether/scene/run.hpp>
 
+#include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/report_run.hpp"
-#include "program/scene_text.hpp"
 
 namespace tether::scene {
 

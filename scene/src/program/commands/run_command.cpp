@@ -4,23 +4,16 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <map>
-#include <memory>
-#include <optional>
 #include <progress.hpp>
-#include <tether/scene/files.hpp>
 #include <tether/scene/player.hpp>
-#include <tether/scene/run.hpp>
 
-#include "output/own_files.hpp"
+#include "output/names.hpp"
+#include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
-#include "program/process/standard_output_file.hpp"
+#include "program/process/standard_streams.hpp"
 #include "program/ranks/ranks.hpp"
 #include "program/report_run.hpp"
-#include "program/scene_text.hpp"
-#include "program/settings.hpp"
-#include "program/terminal_text.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

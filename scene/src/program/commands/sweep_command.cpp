@@ -4,24 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 #include <progress.hpp>
-#include <tether/scene/plan.hpp>
-#include <tether/scene/run.hpp>
-#include <tether/scene/vary.hpp>
 #include <tether/scene/words.hpp>
 #include <thread>
 
-#include "output/output_names.hpp"
-#include "output/own_files.hpp"
-#include "output/whole_file.hpp"
+#include "output/files.hpp"
+#include "output/names.hpp"
+#include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
 #include "program/process/standard_streams.hpp"
 #include "program/process/worker_processes.hpp"
-#include "program/scene_text.hpp"
-#include "program/settings.hpp"
-#include "program/terminal_text.hpp"
+#include "program/report_run.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
-#include <vector>
 
 #include "program/ranks/ranks.hpp"
 

@@ -1,8 +1,6 @@
 // Tether: the processes of one run. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
-#include <string>
 #include <tether/contact/ranks.hpp>
 
 namespace tether::scene {

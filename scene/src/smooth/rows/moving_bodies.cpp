@@ -2,11 +2,10 @@
 #include "moving_bodies.hpp"
 
 #include <Eigen/LU>
-#include <stdexcept>
 #include <tether/linalg/symmetric_eigen.hpp>
 
-#include "mechanics/placed_bodies.hpp"
-#include "mechanics/quaternions.hpp"
+#include "mechanics/bodies.hpp"
+#include "mechanics/frames.hpp"
 
 namespace tether::scene::smooth {
 

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <tether/scene/engine.hpp>
-#include <tether/scene/scene.hpp>
-#include <vector>
 
 #include "mechanics/bodies.hpp"
 #include "mechanics/entries.hpp"
@@ -43,5 +41,11 @@ class MovingBodies {
   std::vector<int> body_of_slot_;
   std::vector<double> start_;
 };
+
+/// Rows of joints, or bodies, each with a norm to keep: below, dense factors cost less.
+constexpr int kManyRows = 48;
+inline bool by_entries(int rows, int bodies) { return rows >= kManyRows || bodies >= kManyRows; }
+/// Unknowns of IDA from which KLU is faster than the dense solver.
+constexpr int kManyUnknowns = 80;
 
 }  // namespace tether::scene::smooth

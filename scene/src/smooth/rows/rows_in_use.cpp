@@ -18,13 +18,10 @@
 // it.
 #include "rows_in_use.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <numeric>
 #include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/singular_values.hpp>
 
-#include "sizes.hpp"
+#include "moving_bodies.hpp"
 
 namespace tether::scene::smooth {
 

@@ -1,10 +1,7 @@
 // Tether: which rows of the joints are used. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-#include <memory>
 #include <tether/linalg/pivoted_qr.hpp>
-#include <vector>
 
 #include "joint_gradient.hpp"
 #include "sparse_row_choice.hpp"

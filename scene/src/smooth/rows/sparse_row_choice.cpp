@@ -13,12 +13,9 @@
 // all along is no singular position: that is where pivots are much smaller than elsewhere.
 #include "sparse_row_choice.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <tether/linalg/pivoted_qr.hpp>
 
-#include "mechanics/quaternions.hpp"
+#include "mechanics/frames.hpp"
 
 namespace tether::scene::smooth {
 

@@ -1,9 +1,7 @@
 // Tether: independent rows of many joints. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <vector>
-
-#include "sparse_joint_gradient.hpp"
+#include "joint_gradient.hpp"
 
 namespace tether::scene::smooth {
 

@@ -1,7 +1,7 @@
 // Tether: accelerations and multipliers of a state. SPDX-License-Identifier: BSD-3-Clause
 #include "forward_dynamics.hpp"
 
-#include "smooth/rows/sizes.hpp"
+#include "smooth/rows/moving_bodies.hpp"
 
 namespace tether::scene::smooth {
 

@@ -2,11 +2,8 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <optional>
-#include <vector>
 
 #include "smooth/rows/joint_gradient.hpp"
-#include "smooth/rows/sparse_joint_gradient.hpp"
 
 namespace tether::scene::smooth {
 

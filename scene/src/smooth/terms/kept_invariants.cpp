@@ -1,9 +1,6 @@
 // Tether: energy and momenta that the projection keeps. SPDX-License-Identifier: BSD-3-Clause
 #include "kept_invariants.hpp"
 
-#include <algorithm>
-#include <stdexcept>
-
 #include "effects/list.hpp"
 
 namespace tether::scene::smooth {

@@ -1,11 +1,6 @@
 // Tether: energy and momenta that the projection keeps. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "mechanics/force.hpp"
 #include "mechanics/units.hpp"
 #include "smooth/rows/moving_bodies.hpp"

@@ -1,0 +1,368 @@
+// Tether: reads URDF. SPDX-License-Identifier: BSD-3-Clause
+//
+// A link's frame is that of the joint which carries it; `origin` places it in the parent's frame,
+// `axis` is in its own. Inertias are about the centre of mass in the axes of <inertial>.
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "robot.hpp"
+#include "xml.hpp"
+
+namespace tether::scene::import {
+
+namespace {
+
+struct UrdfJoint {
+  std::string name, parent, child;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<LinkJoint> joints;  ///< none: fixed
+  int line = 0;
+};
+
+struct Tree {
+  std::vector<const UrdfJoint*> carrier;   // of each link; null: a root
+  std::vector<std::vector<int>> children;  // of each link
+};
+
+std::map<std::string, int> names_of(const std::vector<Link>& links, Problems& problems) {
+  std::map<std::string, int> out;
+  for (std::size_t k = 0; k < links.size(); ++k)
+    if (!out.emplace(links[k].name, static_cast<int>(k)).second)
+      problems.add(links[k].line, fmt::format("link \"{}\": name", links[k].name), "",
+                   "another link has it already");
+  return out;
+}
+
+Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joints,
+             Problems& problems) {
+  const std::map<std::string, int> index = names_of(links, problems);
+  Tree out{std::vector<const UrdfJoint*>(links.size(), nullptr),
+           std::vector<std::vector<int>>(links.size())};
+  std::map<std::string, int> names;
+  for (const UrdfJoint& joint : joints) {
+    const std::string path = fmt::format("joint \"{}\": ", joint.name);
+    if (!names.emplace(joint.name, 0).second)
+      problems.add(joint.line, path + "name", "", "another joint has it already");
+    const auto parent = index.find(joint.parent), child = index.find(joint.child);
+    if (parent == index.end())
+      problems.add(joint.line, path + "parent", fmt::format("\"{}\"", joint.parent),
+                   "there is no such link");
+    if (child == index.end())
+      problems.add(joint.line, path + "child", fmt::format("\"{}\"", joint.child),
+                   "there is no such link");
+    if (parent == index.end() || child == index.end()) continue;
+    const UrdfJoint*& carrier = out.carrier[static_cast<std::size_t>(child->second)];
+    if (carrier != nullptr) {
+      problems.add(
+          joint.line, path + "child", fmt::format("\"{}\"", joint.child),
+          fmt::format("hangs on joint \"{}\" already; closed loops are no URDF", carrier->name));
+      continue;
+    }
+    carrier = &joint;
+    out.children[static_cast<std::size_t>(parent->second)].push_back(child->second);
+  }
+  return out;
+}
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// The only child of that name; null: there is none.
+const Node* only_child(const Node& node, const char* name, Problems& problems) {
+  const Node* const first = node.FirstChildElement(name);
+  if (first != nullptr && first->NextSiblingElement(name) != nullptr)
+    problems.add(first->NextSiblingElement(name)->GetLineNum(), path(node) + ": " + name, "",
+                 "stands twice");
+  return first;
+}
+
+void name_children(const Node& node, std::initializer_list<const char*> known, Remarks& remarks) {
+  for (const Node* each = node.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    bool is_known = false;
+    for (const char* name : known) is_known = is_known || is(*each, name);
+    if (!is_known)
+      remarks.add(fmt::format("<{}> in <{}>", each->Name(), node.Name()), name_or_line(node));
+  }
+}
+
+Isometry3d read_origin(const Node& node, Problems& problems, Remarks& remarks) {
+  const Node* const origin = only_child(node, "origin", problems);
+  if (origin == nullptr) return Isometry3d::Identity();
+  Tag tag(*origin, problems);
+  const Vector3d xyz = tag.vector("xyz", Vector3d::Zero()),
+                 rpy = tag.vector("rpy", Vector3d::Zero());
+  tag.finish(remarks);
+  return placed(from_rpy(rpy), xyz);
+}
+
+void read_inertial(const Node& node, Link& link, Problems& problems, Remarks& remarks) {
+  const Isometry3d origin = read_origin(node, problems, remarks);
+  link.centre = origin.translation();
+  if (const Node* const mass = only_child(node, "mass", problems)) {
+    Tag tag(*mass, problems);
+    if (!tag.has("value")) tag.missing("value", "kg");
+    link.mass = tag.not_negative("value", 0);
+    tag.finish(remarks);
+  } else {
+    problems.add(node.GetLineNum(), path(node) + ": mass", "", "is missing: <mass value=\"kg\"/>");
+  }
+  const Node* const inertia = only_child(node, "inertia", problems);
+  if (inertia == nullptr)
+    return problems.add(node.GetLineNum(), path(node) + ": inertia", "",
+                        "is missing: ixx, ixy, ixz, iyy, iyz, izz in kg m^2");
+  Tag tag(*inertia, problems);
+  const auto entry = [&](const char* key) {
+    if (!tag.has(key)) tag.missing(key, "kg m^2");
+    return tag.number(key, 0);
+  };
+  const double xx = entry("ixx"), xy = entry("ixy"), xz = entry("ixz"), yy = entry("iyy"),
+               yz = entry("iyz"), zz = entry("izz");
+  tag.finish(remarks);
+  Matrix3d matrix;
+  matrix << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  const Matrix3d turned = origin.linear() * matrix * origin.linear().transpose();
+  // Turning by the identity would only add rounding.
+  link.inertia = origin.linear() == Matrix3d::Identity()
+                     ? matrix
+                     : Matrix3d((turned + turned.transpose()) / 2);
+  name_children(node, {"origin", "mass", "inertia"}, remarks);
+}
+
+/// Nothing where scenes have no such shape, or where it has no size.
+std::optional<Shape> read_geometry(const Node& node, Problems& problems, Remarks& remarks) {
+  Tag tag(node, problems);
+  const auto size_of = [&](const char* key) {
+    if (!tag.has(key)) tag.missing(key, "m");
+    return tag.not_negative(key, 0);
+  };
+  Shape shape;
+  double least = 0;
+  if (is(node, "sphere")) {
+    least = shape.radius = size_of("radius");
+  } else if (is(node, "box")) {
+    shape.kind = ShapeKind::box;
+    if (!tag.has("size")) tag.missing("size", "the full edges, m");
+    shape.size = tag.vector("size", Vector3d::Zero());
+    least = shape.size.minCoeff();
+    if (!(least >= 0)) tag.wrong("size", "must be three numbers > 0");
+  } else if (is(node, "cylinder") || is(node, "capsule")) {
+    shape.kind = is(node, "cylinder") ? ShapeKind::cylinder : ShapeKind::capsule;
+    shape.radius = size_of("radius");
+    shape.length = size_of("length");
+    least = std::min(shape.radius, shape.length);
+  } else {
+    return {};
+  }
+  tag.finish(remarks);
+  if (least > 0) return shape;
+  return {};
+}
+
+void read_collision(const Node& node, Link& link, Problems& problems, Remarks& remarks) {
+  const Isometry3d origin = read_origin(node, problems, remarks);
+  const Node* const geometry = only_child(node, "geometry", problems);
+  const Node* const kind = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
+  if (kind == nullptr)
+    return problems.add(node.GetLineNum(), path(node) + ": geometry", "",
+                        "is missing: a box, cylinder, sphere, capsule or mesh");
+  std::optional<Shape> shape = read_geometry(*kind, problems, remarks);
+  if (!shape) {
+    const bool known =
+        is(*kind, "box") || is(*kind, "sphere") || is(*kind, "cylinder") || is(*kind, "capsule");
+    return remarks.add(
+        fmt::format("collision geometry <{}>{}", kind->Name(), known ? " without size" : ""),
+        link.name);
+  }
+  shape->position = origin.translation();
+  if (origin.linear() != Matrix3d::Identity()) shape->orientation = origin.linear();
+  link.shapes.push_back(std::move(*shape));
+  name_children(node, {"origin", "geometry"}, remarks);
+  name_children(*geometry, {kind->Name()}, remarks);
+}
+
+Link read_link(const Node& node, Problems& problems, Remarks& remarks) {
+  Tag tag(node, problems);
+  Link link;
+  link.line = tag.line();
+  link.name = tag.name("name", "every link has one");
+  tag.finish(remarks, {"type"});
+  if (const Node* const inertial = only_child(node, "inertial", problems))
+    read_inertial(*inertial, link, problems, remarks);
+  for (const Node* each = node.FirstChildElement("collision"); each != nullptr;
+       each = each->NextSiblingElement("collision"))
+    read_collision(*each, link, problems, remarks);
+  if (node.FirstChildElement("visual") != nullptr)
+    remarks.add("<visual>, which shows and does not touch");
+  name_children(node, {"inertial", "collision", "visual"}, remarks);
+  link.touch = Touch{1, true, 1, 1};
+  return link;
+}
+
+void read_limit(const Node& node, bool has_range, LinkJoint& joint, Problems& problems,
+                Remarks& remarks) {
+  const Node* const limit = only_child(node, "limit", problems);
+  if (limit == nullptr) {
+    if (has_range)
+      problems.add(node.GetLineNum(), path(node) + ": limit", "",
+                   "is missing: revolute and prismatic joints have one (continuous has none)");
+    return;
+  }
+  Tag tag(*limit, problems);
+  for (const char* key : {"effort", "velocity"})
+    if (tag.has(key) && tag.number(key, 0) > 0)
+      remarks.add(fmt::format("limit {} of joints, which is of their drives", key));
+  const bool given = tag.has("lower") || tag.has("upper");
+  const double lower = tag.number("lower", 0), upper = tag.number("upper", 0);
+  tag.finish(remarks);
+  if (!has_range) return;
+  if (lower > upper) return tag.wrong("lower", "must be at most upper");
+  // Programs write 0 and 0 where they know no limits.
+  if (!given || (lower == 0 && upper == 0))
+    return remarks.add("limits 0 and 0, so these joints move freely (--hold NAME fixes one)",
+                       joint.name);
+  if (lower == upper)
+    remarks.add("joints whose limits are equal, which are fixed there", joint.name);
+  joint.limits = {lower, upper};
+}
+
+void read_joint_parts(const Node& node, const std::string& type, LinkJoint& joint,
+                      Problems& problems, Remarks& remarks) {
+  if (const Node* const axis = only_child(node, "axis", problems)) {
+    Tag tag(*axis, problems);
+    joint.axis = tag.direction("xyz", Vector3d::UnitX());
+    tag.finish(remarks);
+  } else {
+    joint.axis = Vector3d::UnitX();
+  }
+  read_limit(node, type == "revolute" || type == "prismatic", joint, problems, remarks);
+  if (const Node* const dynamics = only_child(node, "dynamics", problems)) {
+    Tag tag(*dynamics, problems);
+    joint.damping = tag.not_negative("damping", 0);
+    joint.friction = tag.not_negative("friction", 0);
+    tag.finish(remarks);
+  }
+  if (const Node* const mimic = only_child(node, "mimic", problems)) {
+    Tag tag(*mimic, problems);
+    joint.mimic = Mimic{tag.name("joint", "the name of a joint"), tag.number("multiplier", 1),
+                        tag.number("offset", 0)};
+    tag.finish(remarks);
+  }
+  name_children(node, {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"}, remarks);
+}
+
+UrdfJoint read_joint(const Node& node, Problems& problems, Remarks& remarks) {
+  static const std::map<std::string, MotionKind> kinds{
+      {"revolute", MotionKind::hinge},  {"continuous", MotionKind::hinge},
+      {"prismatic", MotionKind::slide}, {"floating", MotionKind::free},
+      {"planar", MotionKind::planar},   {"spherical", MotionKind::ball}};
+  UrdfJoint out;
+  Tag tag(node, problems);
+  out.line = tag.line();
+  out.name = tag.name("name", "every joint has one");
+  const std::string type = tag.text("type");
+  tag.finish(remarks);
+  const auto link_of = [&](const char* which) {
+    const Node* const end = only_child(node, which, problems);
+    if (end == nullptr) {
+      problems.add(node.GetLineNum(), path(node) + ": " + which, "",
+                   fmt::format("is missing: <{} link=\"...\"/>", which));
+      return std::string();
+    }
+    Tag of_end(*end, problems);
+    return of_end.name("link", "the name of a link");
+  };
+  out.parent = link_of("parent");
+  out.child = link_of("child");
+  out.pose = read_origin(node, problems, remarks);
+  const auto kind = kinds.find(type);
+  if (kind == kinds.end() && type != "fixed")
+    tag.wrong("type", "must be revolute, continuous, prismatic, fixed, floating or planar");
+  if (kind == kinds.end()) {
+    name_children(node,
+                  {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic",
+                   "safety_controller", "calibration"},
+                  remarks);
+    return out;
+  }
+  LinkJoint joint;
+  joint.name = out.name;
+  joint.line = out.line;
+  joint.kind = kind->second;
+  read_joint_parts(node, type, joint, problems, remarks);
+  out.joints.push_back(std::move(joint));
+  return out;
+}
+
+}  // namespace
+
+std::vector<Link> in_tree_order(std::vector<Link> links, const std::vector<UrdfJoint>& joints,
+                                Problems& problems) {
+  const Tree tree = tree_of(links, joints, problems);
+  if (!problems.clean()) return {};
+  std::vector<int> order, place(links.size(), -1);
+  for (std::size_t k = 0; k < links.size(); ++k)
+    if (tree.carrier[k] == nullptr) {
+      if (!order.empty())
+        problems.add(links[k].line, fmt::format("link \"{}\"", links[k].name), "",
+                     fmt::format("no joint carries it, as none carries \"{}\": one link is the "
+                                 "base",
+                                 links[static_cast<std::size_t>(order[0])].name));
+      order.push_back(static_cast<int>(k));
+    }
+  for (std::size_t next = 0; next < order.size(); ++next)
+    for (const int child : tree.children[static_cast<std::size_t>(order[next])])
+      order.push_back(child);
+  for (std::size_t k = 0; k < order.size(); ++k)
+    place[static_cast<std::size_t>(order[k])] = static_cast<int>(k);
+  for (std::size_t k = 0; k < links.size(); ++k)
+    if (place[k] < 0) {
+      problems.add(links[k].line, fmt::format("link \"{}\"", links[k].name), "",
+                   "is in a loop of joints: a URDF is a tree");
+      break;
+    }
+  if (!problems.clean()) return {};
+  std::vector<Link> out;
+  const std::map<std::string, int> index = names_of(links, problems);
+  for (const int k : order) {
+    Link link = std::move(links[static_cast<std::size_t>(k)]);
+    if (const UrdfJoint* joint = tree.carrier[static_cast<std::size_t>(k)]) {
+      link.parent = place[static_cast<std::size_t>(index.at(joint->parent))];
+      link.pose = joint->pose;
+      link.joints = joint->joints;
+    }
+    out.push_back(std::move(link));
+  }
+  return out;
+}
+
+Model read_urdf(const Node& root, Problems& problems) {
+  Model model;
+  Tag robot(root, problems);
+  model.format = "URDF";
+  model.name = robot.text("name");
+  model.gravity = Vector3d(0, 0, -9.81);
+  model.base_is_said = false;
+  std::vector<Link> links;
+  std::vector<UrdfJoint> joints;
+  for (const Node* each = root.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement()) {
+    if (is(*each, "link"))
+      links.push_back(read_link(*each, problems, model.remarks));
+    else if (is(*each, "joint"))
+      joints.push_back(read_joint(*each, problems, model.remarks));
+    else if (std::strncmp(each->Name(), "xacro:", 6) == 0)
+      problems.add(each->GetLineNum(), path(*each), "",
+                   "is xacro: expand it first (xacro FILE > robot.urdf)");
+    else
+      model.remarks.add(fmt::format("<{}>", each->Name()));
+  }
+  if (links.empty()) problems.add(root.GetLineNum(), "robot", "", "has no link");
+  // Parts that were wrong stand as defaults, which must not be blamed in turn.
+  if (problems.clean()) model.links = in_tree_order(std::move(links), joints, problems);
+  return model;
+}
+
+}  // namespace tether::scene::import

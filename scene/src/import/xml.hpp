@@ -1,0 +1,96 @@
+// Tether: XML elements with checked attributes. SPDX-License-Identifier: BSD-3-Clause
+//
+// Files are not trusted: size, depth, encoding, entities and character references are looked
+// at before anything is read from them.
+#pragma once
+
+#include <tinyxml2.h>
+
+#include <set>
+
+#include "robot.hpp"
+#include "toml/report.hpp"
+
+namespace tether::scene::import {
+
+using Node = tinyxml2::XMLElement;
+
+/// Collects what is wrong in a file, each with its line.
+class Problems : public files::Report {
+ public:
+  explicit Problems(std::string file) : file_(std::move(file)) {}
+  void add(int line, std::string field, std::string value, std::string allowed) {
+    Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
+                std::move(allowed));
+  }
+
+ private:
+  std::string file_;
+};
+
+/// A document whose text is UTF-8 with at most 64 MiB, 100 elements inside each other, no DOCTYPE
+/// and no attribute twice. Throws SceneError.
+class Document {
+ public:
+  Document(std::string_view text, Problems& problems);
+  const Node& root() const { return *xml_.RootElement(); }
+
+ private:
+  tinyxml2::XMLDocument xml_;
+};
+
+/// `joint "elbow"`, or `link "arm": inertial: mass` for elements without a name.
+std::string path(const Node& node);
+/// The attribute `name`, or "line 12" of an element without one.
+std::string name_or_line(const Node& node);
+bool is(const Node& node, std::string_view name);
+
+/// Without what a terminal obeys in place of showing it.
+std::string shown(const std::string& text);
+
+/// Attributes by name, as in a defaults class.
+using Attributes = std::map<std::string, std::string, std::less<>>;
+
+/// The attributes of an element, those that it has not taken from `defaults`. What is wrong is
+/// reported and replaced by its default.
+class Tag {
+ public:
+  Tag(const Node& node, Problems& problems, const Attributes* defaults = nullptr)
+      : node_(node), problems_(problems), defaults_(defaults) {}
+
+  const char* find(std::string_view key);  ///< null: it is not there
+  bool has(std::string_view key) { return find(key) != nullptr; }
+  std::string text(std::string_view key, std::string_view otherwise = "");
+  std::string name(std::string_view key, std::string_view allowed);  ///< must be there
+  double number(std::string_view key, double otherwise);
+  double positive(std::string_view key, double otherwise);
+  double not_negative(std::string_view key, double otherwise);
+  bool flag(std::string_view key, bool otherwise);  ///< true or false
+  Eigen::Vector3d vector(std::string_view key, const Eigen::Vector3d& otherwise);
+  /// A direction of any length but zero; returned with length 1.
+  Eigen::Vector3d direction(std::string_view key, const Eigen::Vector3d& otherwise);
+  /// `least` to `most` finite numbers; empty if absent or wrong.
+  std::vector<double> numbers(std::string_view key, std::size_t least, std::size_t most);
+
+  void wrong(std::string_view key, std::string allowed);
+  void missing(std::string_view key, std::string allowed);
+  /// Says which attributes nobody has asked for, beside those of `no_matter`.
+  void finish(Remarks& remarks, const std::set<std::string, std::less<>>& no_matter = {});
+
+  const Node& node() const { return node_; }
+  int line() const { return node_.GetLineNum(); }
+
+ private:
+  const Node& node_;
+  Problems& problems_;
+  const Attributes* defaults_;
+  std::set<std::string, std::less<>> asked_;
+};
+
+/// `root`: <robot>. Problems are reported; the model is of use where there are none.
+Model read_urdf(const Node& root, Problems& problems);
+
+/// `root`: <mujoco>. Problems are reported; the model is of use where there are none.
+Model read_mjcf(const Node& root, Problems& problems);
+
+}  // namespace tether::scene::import

@@ -1,0 +1,204 @@
+// Tether: the coordinate along which a joint leaves its bodies free, or that a motion prescribes.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+
+#include "mechanics/bodies.hpp"
+
+namespace tether::scene::joints {
+
+enum class MotionOf { nothing, angle, length };
+
+using namespace mechanics;
+
+/// Hinge: the angle of the first body against the second about the axis, rad, in (-pi, pi]; slider:
+/// the way of the first body along the axis, m; distance: the distance of both points, m; ball: a
+/// component in world axes of the turn of the first body against the second since t = 0, rad.
+class Coordinate {
+ public:
+  /// `bodies`: at t = 0. `component`: x, y, z as 0, 1, 2 of the turn of a ball; else none.
+  Coordinate(const Joint& joint, const Bodies& bodies, int component = -1);
+
+  MotionOf what() const { return what_; }
+  bool is_component() const { return component_ >= 0; }
+  int first() const { return first_; }  ///< of Bodies
+  int second() const { return second_; }
+  /// The joint's point, carried by the first body: world axes, m.
+  Vector3d place(const Bodies& bodies) const;
+
+  double value(const Bodies& bodies) const { return value(A(bodies), B(bodies)); }
+  double rate(const Bodies& bodies) const { return rate(A(bodies), B(bodies)); }
+  /// Its second derivative without accelerations of the bodies.
+  double rest(const Bodies& bodies) const;
+  /// The unit of force along it, on the first body: what() == angle, the moment u; length, the
+  /// force u. World axes.
+  Vector3d direction(const Bodies& bodies) const { return direction(A(bodies), B(bodies)); }
+  /// Its gradient: loads on both bodies that a unit of force along it makes.
+  void gradient(const Bodies& bodies, Wrench<double>& on_first, Wrench<double>& on_second) const {
+    on_first = on_second = no_wrench<double>();
+    pull(A(bodies), B(bodies), 1.0, on_first, on_second);
+  }
+
+  /// The same by the frames of both bodies, for any scalar.
+  template <class S>
+  S value(const Frame<S>& A, const Frame<S>& B) const;
+  template <class S>
+  S rate(const Frame<S>& A, const Frame<S>& B) const;
+  /// Its value and derivatives up to `order` with the accelerations of the frames: of hinges and
+  /// sliders.
+  template <int order, class S>
+  void derivatives(const Frame<S>& A, const Frame<S>& B, S* s) const;
+  template <class S>
+  Vector3<S> direction(const Frame<S>& A, const Frame<S>& B) const;
+  /// Adds a force along it.
+  template <class S>
+  void pull(const Frame<S>& A, const Frame<S>& B, const S& force, Wrench<S>& on_first,
+            Wrench<S>& on_second) const;
+
+ private:
+  static constexpr double kNear = 0.1;  // 1 - cosine: the series has two digits a term
+
+  const Frame<double>& A(const Bodies& bodies) const { return bodies.frames[at(first_)]; }
+  const Frame<double>& B(const Bodies& bodies) const { return bodies.frames[at(second_)]; }
+  template <class S>
+  Vector3<S> span(const Frame<S>& A, const Frame<S>& B) const {
+    return Vector3<S>(point<0>(A, at_first_).x - point<0>(B, at_second_).x);
+  }
+  template <class S>
+  S turn(const Frame<S>& A, const Frame<S>& B) const;
+  template <class S>
+  static S angle_over_sine(const S& cosine);
+
+  MotionOf what_;
+  bool fixed_direction_;  // in the axes of the second body
+  int component_;
+  int first_, second_;
+  Vector3d at_first_, at_second_;     // in the axes of each body
+  Vector3d of_first_, zero_, ahead_;  // angle: it turns of_first from zero to ahead
+  Vector3d axis_;                     // of the second body
+  Matrix3d start_;                    // component: of the second body in axes of the first
+};
+
+template <class S>
+S Coordinate::value(const Frame<S>& A, const Frame<S>& B) const {
+  using std::atan2;
+  using std::sqrt;
+  if (is_component()) return turn(A, B);
+  if (what_ == MotionOf::angle) {
+    const Vector3<S> u = times(A.R, of_first_);
+    const S sine = dot(u, times(B.R, ahead_)), cosine = dot(u, times(B.R, zero_));
+    return S(atan2(sine, cosine));
+  }
+  const Vector3<S> d = span(A, B);
+  return fixed_direction_ ? S(dot(d, times(B.R, axis_))) : S(sqrt(dot(d, d)));
+}
+
+// s = atan2(y, x), r s' = x y' - y x', r s'' = x y'' - y x'' - r' s', r = x^2 + y^2
+template <int order, class S>
+void Coordinate::derivatives(const Frame<S>& A, const Frame<S>& B, S* s) const {
+  s[0] = value(A, B);
+  if constexpr (order == 0) return;
+  if (what_ == MotionOf::length) {
+    Jet<S> d = point<order>(A, at_first_);
+    const Jet<S> b = point<order>(B, at_second_), u = mechanics::direction<order>(B, axis_);
+    d.x -= b.x;
+    if constexpr (order >= 1) d.x1 -= b.x1;
+    if constexpr (order >= 2) d.x2 -= b.x2;
+    if constexpr (order >= 1) s[1] = product<1>(u, d);
+    if constexpr (order >= 2) s[2] = product<2>(u, d);
+    return;
+  }
+  const Jet<S> u = mechanics::direction<order>(A, of_first_),
+               along = mechanics::direction<order>(B, zero_),
+               ahead = mechanics::direction<order>(B, ahead_);
+  const S x = product<0>(u, along), y = product<0>(u, ahead);
+  const S r = S(x * x + y * y);
+  if constexpr (order >= 1) {
+    const S x1 = product<1>(u, along), y1 = product<1>(u, ahead);
+    const S turned = S(x * y1 - y * x1);
+    s[1] = S(turned / r);
+    if constexpr (order >= 2) {
+      const S x2 = product<2>(u, along), y2 = product<2>(u, ahead);
+      const S r1 = S(x * x1 + y * y1);
+      s[2] = S((x * y2 - y * x2 - 2.0 * r1 * s[1]) / r);
+    }
+  }
+}
+
+template <class S>
+S Coordinate::rate(const Frame<S>& A, const Frame<S>& B) const {
+  Wrench<S> on_first = no_wrench<S>(), on_second = no_wrench<S>();
+  pull(A, B, S(1.0), on_first, on_second);
+  S sum = dot(on_first.force, A.v);
+  sum += dot(on_first.torque, A.W);
+  sum += dot(on_second.force, B.v);
+  sum += dot(on_second.torque, B.W);
+  return sum;
+}
+
+template <class S>
+Vector3<S> Coordinate::direction(const Frame<S>& A, const Frame<S>& B) const {
+  using std::sqrt;
+  if (is_component()) {
+    Vector3<S> u(S(0.0), S(0.0), S(0.0));
+    u[component_] = S(1.0);
+    return u;
+  }
+  if (fixed_direction_) return times(B.R, axis_);
+  Vector3<S> d = span(A, B);
+  const S square = dot(d, d);
+  if (!(square > 0.0)) return d;
+  const S length = sqrt(square);
+  for (int i = 0; i < 3; ++i) d[i] /= length;
+  return d;
+}
+
+template <class S>
+void Coordinate::pull(const Frame<S>& A, const Frame<S>& B, const S& force, Wrench<S>& on_first,
+                      Wrench<S>& on_second) const {
+  Vector3<S> u = direction(A, B);
+  for (int i = 0; i < 3; ++i) u[i] *= force;
+  if (what_ == MotionOf::angle) {
+    for (int i = 0; i < 3; ++i) {
+      on_first.torque[i] += u[i];
+      on_second.torque[i] -= u[i];
+    }
+    return;
+  }
+  // A slider's acts on both bodies at the point of the first.
+  const Vector3<S> p = point<0>(A, at_first_).x;
+  on_first.add(A, p, u);
+  on_second.add(B, fixed_direction_ ? p : point<0>(B, at_second_).x, Vector3<S>(-u));
+}
+
+// The turn Q = A start B' has the vector (angle / sine) (axis of Q - Q') / 2.
+template <class S>
+S Coordinate::turn(const Frame<S>& A, const Frame<S>& B) const {
+  S trace(0.0), part(0.0);
+  for (int k = 0; k < 3; ++k) {
+    const Vector3<S> a = times(A.R, Vector3d(start_.col(k))),
+                     b = times(B.R, Vector3d(Vector3d::Unit(k)));
+    trace += dot(a, b);
+    part += cross(b, a)[component_];
+  }
+  const S cosine = S(0.5 * (trace - 1.0));
+  return S(0.5 * part * angle_over_sine(cosine));
+}
+
+// sum of n! / (2n + 1)!! (1 - cosine)^n near 1
+template <class S>
+S Coordinate::angle_over_sine(const S& cosine) {
+  using std::acos;
+  using std::sqrt;
+  const S y = S(1.0 - cosine);
+  if (y > kNear) return S(acos(cosine) / sqrt(S(1.0 - cosine * cosine)));
+  S term(1.0), sum(1.0);
+  for (int n = 1; n < 16; ++n) {
+    term = S(term * y * (n / (2.0 * n + 1.0)));
+    sum += term;
+  }
+  return sum;
+}
+
+}  // namespace tether::scene::joints

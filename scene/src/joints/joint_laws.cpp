@@ -1,0 +1,128 @@
+// Tether: laws along the free coordinates of joints. SPDX-License-Identifier: BSD-3-Clause
+#include "joint_laws.hpp"
+
+#include <tether/linalg/pi.hpp>
+
+#include "coordinate.hpp"
+#include "effects/list.hpp"
+#include "joint_type.hpp"
+
+namespace tether::scene::joints {
+
+Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
+    : what_(component < 0 ? type(joint.kind).motion() : MotionOf::angle),
+      fixed_direction_(joint.kind != JointKind::distance),
+      component_(component),
+      first_(bodies.index(joint.first)),
+      second_(bodies.index(joint.second)),
+      at_first_(point_in(A(bodies), joint.at)),
+      at_second_(point_in(B(bodies), type(joint.kind).point_on_second(joint))) {
+  const Vector3d z = joint.axis.norm() > 0 ? Vector3d(joint.axis.normalized()) : Vector3d::UnitZ();
+  const Vector3d x = z.unitOrthogonal(), y = z.cross(x);
+  of_first_ = direction_in(A(bodies), x);
+  zero_ = direction_in(B(bodies), x);
+  ahead_ = direction_in(B(bodies), y);
+  axis_ = direction_in(B(bodies), z);
+  start_ = A(bodies).R.transpose() * B(bodies).R;
+}
+
+Vector3d Coordinate::place(const Bodies& bodies) const { return point<0>(A(bodies), at_first_).x; }
+
+double Coordinate::rest(const Bodies& bodies) const {
+  if (what_ == MotionOf::angle)
+    return B(bodies).W.cross(direction(bodies)).dot(A(bodies).W - B(bodies).W);
+  const Jet<double> a = point<2>(A(bodies), at_first_), b = point<2>(B(bodies), at_second_);
+  const Vector3d d = a.x - b.x, d1 = a.x1 - b.x1, d2 = a.x2 - b.x2;
+  if (fixed_direction_) {
+    const Jet<double> u = mechanics::direction<2>(B(bodies), axis_);
+    return d2.dot(u.x) + 2 * d1.dot(u.x1) + d.dot(u.x2);
+  }
+  const double length = d.norm(), along = d.dot(d1) / length;
+  return (d1.squaredNorm() - along * along + d.dot(d2)) / length;
+}
+
+namespace {
+
+constexpr double kBeyond = 1e-9;  // m or rad: a start this far beyond a limit is on it
+
+bool has_laws(const Joint& joint) { return joint.limits || joint.motor || joint.friction != 0; }
+bool is_free(const Joint& joint) { return type(joint.kind).is_free() && !joint.motion; }
+
+}  // namespace
+
+std::vector<Coordinate> coordinates_of(const Joint& joint, std::size_t number,
+                                       const Bodies& bodies) {
+  if (is_free(joint)) return {Coordinate(joint, bodies)};
+  if (!type(joint.kind).turns_freely())
+    throw std::invalid_argument("joint \"" + name_of(joint, number) +
+                                "\": a spring acts on balls, and on hinges and sliders that no "
+                                "motion drives");
+  std::vector<Coordinate> out;
+  for (int k = 0; k < 3; ++k) out.emplace_back(joint, bodies, k);
+  return out;
+}
+
+JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
+  for (std::size_t j = 0; j < scene.joints.size(); ++j) {
+    const Joint& joint = scene.joints[j];
+    if (!has_laws(joint) && !joint.spring) continue;
+    const std::string name = "joint \"" + name_of(joint, j) + "\": ";
+    if (has_laws(joint) && !is_free(joint))
+      throw std::invalid_argument(name +
+                                  "limits, a motor and friction act on hinges and sliders that no "
+                                  "motion drives");
+    for (Coordinate& each : coordinates_of(joint, j, bodies))
+      joints_.push_back({static_cast<int>(j), joint, std::move(each)});
+    if (joint.limits && (joint.limits->lower > kBeyond || joint.limits->upper < -kBeyond))
+      throw std::invalid_argument(name + "it is at 0 at t = 0, which must be between its limits");
+  }
+}
+
+// The turn of a hinge whose angle is nearest to the middle between its limits.
+double JointLaws::value(const Item& item, const Bodies& bodies) const {
+  const double value = item.coordinate.value(bodies);
+  if (!item.law.limits || item.coordinate.what() != MotionOf::angle) return value;
+  const double middle = 0.5 * (item.law.limits->lower + item.law.limits->upper);
+  const double turn = 2 * linalg::kPi;
+  return value + turn * std::round((middle - value) / turn);
+}
+
+void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
+  placed_.clear();
+  mechanics::JointLawList list{out, bodies.time, nullptr};
+  for (std::size_t k = 0; k < joints_.size(); ++k) {
+    const Item& item = joints_[k];
+    const double at_now = value(item, bodies);
+    Wrench<double> on[2];
+    item.coordinate.gradient(bodies, on[0], on[1]);
+    const int body[2] = {item.coordinate.first(), item.coordinate.second()};
+    // One law after the other: a term goes to the law added last.
+    list.on = [&](double sign) {
+      placed_.push_back({static_cast<int>(k), sign, out[out.count() - 1].is_sprung()});
+      for (int side = 0; side < 2; ++side) {
+        if (!bodies.moves(body[side])) continue;
+        contact::Vector6d G;
+        G << sign * on[side].force, sign * on[side].torque;
+        out.on(body[side], G);
+      }
+    };
+    for (const effects::Effect* each : effects::all())
+      each->add_laws(item.law, item.joint, at_now, list);
+  }
+}
+
+void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
+                           std::vector<JointForce>& forces) const {
+  if (!(dt > 0)) return;
+  for (std::size_t i = 0; i < impulses.size() && i < placed_.size(); ++i) {
+    if (placed_[i].sprung) continue;
+    const Item& item = joints_[at(placed_[i].item)];
+    const double x = placed_[i].sign * impulses[i] / dt;
+    JointForce& force = forces[at(item.joint)];
+    const bool angle = item.coordinate.what() == MotionOf::angle;
+    (angle ? force.moment : force.force) += x * item.coordinate.direction(bodies);
+    force.drive += x;
+  }
+}
+
+}  // namespace tether::scene::joints

@@ -1,0 +1,273 @@
+// Tether: files that are whole or absent. SPDX-License-Identifier: BSD-3-Clause
+#include "files.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <utility>
+
+namespace tether::scene {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(const std::string& file) {
+  throw std::runtime_error(fmt::format("cannot write {}: {}", file, std::strerror(errno)));
+}
+
+constexpr int kNew = O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC;
+
+void write_all(const Open& out, const std::string& file, std::string_view content, bool lasting) {
+  if (out.descriptor < 0) fail(file);
+  while (!content.empty()) {
+    const ssize_t written = write(out.descriptor, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) fail(file);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (lasting && fsync(out.descriptor) != 0 && errno != EINVAL && errno != EROFS) fail(file);
+}
+
+// A full disk gets its room back.
+void write_or_remove(const Open& out, const std::string& file, std::string_view content,
+                     bool lasting) {
+  try {
+    write_all(out, file, content, lasting);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(file, ignored);
+    throw;
+  }
+}
+
+// A file that has the name is removed, not written into: it may be a link, a pipe or the second
+// name of another file.
+void replace(const std::string& file, std::string_view content, bool lasting) {
+  unlink(file.c_str());
+  const Open out{open(file.c_str(), kNew, 0666)};
+  if (out.descriptor < 0) fail(file);
+  write_or_remove(out, file, content, lasting);
+}
+
+// The name in the folder outlasts a loss of power only with the folder.
+void sync_folder_of(const std::string& file) {
+  const fs::path folder = fs::path(file).parent_path();
+  const Open in{open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (in.descriptor >= 0) fsync(in.descriptor);
+}
+
+constexpr std::size_t kWaiting = 4096;  // bytes; who watches a table sees it grow
+
+/// Whether the name still stands for the open file: its last owner may have removed it.
+bool is_there(const std::string& name, int descriptor) {
+  struct stat open_file {
+  }, named{};
+  return fstat(descriptor, &open_file) == 0 && stat(name.c_str(), &named) == 0 &&
+         open_file.st_ino == named.st_ino && open_file.st_dev == named.st_dev;
+}
+
+/// Text of a lock: the number of its process, which a run has written, or what somebody else did.
+std::string content(int descriptor) {
+  char text[16] = {};
+  const ssize_t count = pread(descriptor, text, sizeof text - 1, 0);
+  return {text, static_cast<std::size_t>(std::max<ssize_t>(count, 0))};
+}
+
+bool is_lock(const std::string& text) {
+  return text.find_first_not_of("0123456789\n") == std::string::npos && text.size() < 15;
+}
+
+}  // namespace
+
+Open::~Open() {
+  if (descriptor >= 0) close(descriptor);
+}
+
+int open_to_write(const std::string& file, int flags) {
+  struct stat there {};
+  const bool is_pipe = stat(file.c_str(), &there) == 0 && S_ISFIFO(there.st_mode);
+  if (!is_pipe) return open(file.c_str(), O_WRONLY | O_CLOEXEC | flags, 0666);
+  for (;;) {
+    const int descriptor = open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK);
+    if (descriptor >= 0) {
+      fcntl(descriptor, F_SETFL, 0);  // writes wait
+      return descriptor;
+    }
+    if (errno != ENXIO) return -1;
+    // A sleep ends by every signal that is handled; open() would go on.
+    constexpr timespec kLook{0, 20000000};
+    if (nanosleep(&kLook, nullptr) != 0)
+      throw Interrupted("interrupted while a reader of " + file + " was waited for");
+  }
+}
+
+void make_folder_of(const std::string& file) {
+  const fs::path folder = fs::path(file).parent_path();
+  if (folder.empty()) return;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    throw std::runtime_error(fmt::format("cannot make {}: {}", folder.string(), error.message()));
+}
+
+void write_whole_regular(const std::string& file, std::string_view content) {
+  make_folder_of(file);
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there))
+    throw std::runtime_error("cannot write " + file + ": it is there and is no file");
+  const std::string fresh = file + ".new";
+  replace(fresh, content, true);
+  if (std::rename(fresh.c_str(), file.c_str()) != 0) {
+    const int reason = errno;
+    fs::remove(fresh, error);
+    errno = reason;
+    fail(file);
+  }
+  sync_folder_of(file);
+}
+
+void write_whole(const std::string& file, std::string_view content) {
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there))
+    write_all(Open{open_to_write(file, 0)}, file, content, false);
+  else
+    write_whole_regular(file, content);
+}
+
+void write_fresh(const std::string& file, std::string_view content) {
+  replace(file, content, false);
+}
+
+void write_new(const std::string& file, std::string_view content) {
+  Open out{open(file.c_str(), kNew, 0666)};
+  if (out.descriptor < 0) fail(file);
+  write_or_remove(out, file, content, false);
+}
+
+void check_writable(const std::string& file) {
+  std::error_code error;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there)) return;  // a device
+  make_folder_of(file);
+  const std::string trial = file + ".new";
+  {
+    const Open out{open(trial.c_str(), kNew, 0666)};
+    // A file that is there gives way when the new one is written, not before.
+    if (out.descriptor < 0 && (errno != EEXIST || fs::is_directory(trial, error))) fail(file);
+    if (out.descriptor < 0) return;
+  }
+  fs::remove(trial, error);
+}
+
+RowFile::RowFile(std::string file, std::size_t kept) : file_(std::move(file)), size_(kept) {
+  make_folder_of(file_);
+  descriptor_ = open_to_write(file_, O_CREAT | (kept > 0 ? 0 : O_TRUNC));
+  if (descriptor_ < 0) fail();
+  const auto end = static_cast<off_t>(kept);
+  if (kept > 0 && (ftruncate(descriptor_, end) != 0 || lseek(descriptor_, end, SEEK_SET) != end)) {
+    close(std::exchange(descriptor_, -1));
+    fail();
+  }
+}
+
+RowFile::~RowFile() {
+  if (descriptor_ < 0) return;
+  try {
+    flush();
+    close(descriptor_);
+  } catch (const std::exception&) {  // whatever ends this run early has said why
+  }
+}
+
+void RowFile::put(std::string_view rows) {
+  waiting_ += rows;
+  if (waiting_.size() >= kWaiting) flush();
+}
+
+void RowFile::flush() {
+  std::size_t done = 0;
+  while (done < waiting_.size()) {
+    const ssize_t written = write(descriptor_, waiting_.data() + done, waiting_.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) {
+      const int reason = written == 0 ? ENOSPC : errno;
+      waiting_.resize(done);
+      size_ += waiting_.rfind('\n') + 1;  // npos + 1 is 0
+      // Rows cannot be taken back from a device or a pipe.
+      if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) waiting_.clear();
+      close(std::exchange(descriptor_, -1));
+      errno = reason;
+      fail();
+    }
+    done += static_cast<std::size_t>(written);
+  }
+  size_ += done;
+  waiting_.clear();
+}
+
+void RowFile::keep() {
+  flush();
+  fsync(descriptor_);  // devices have none
+}
+
+void RowFile::fail() {
+  throw std::runtime_error(fmt::format("cannot write {}: {}", file_, std::strerror(errno)));
+}
+
+void OutputLock::take(const std::string& file) {
+  std::error_code error;
+  const auto there = std::filesystem::status(file, error);
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) return;
+  make_folder_of(file);
+  const std::string name = file + ".lock";
+  for (;;) {
+    const int descriptor = open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (descriptor < 0) return;  // whoever writes the file says why that cannot be
+    if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+      const bool busy = errno == EWOULDBLOCK;
+      const std::string owner = busy ? content(descriptor) : "";
+      close(descriptor);
+      if (!busy) return;
+      throw std::runtime_error(fmt::format(
+          "{} is being written by another run{}: wait for it, or give this one other files "
+          "(--output DIR)",
+          file, owner.empty() ? "" : " (process " + owner.substr(0, owner.find('\n')) + ")"));
+    }
+    if (!is_there(name, descriptor)) {
+      close(descriptor);
+      continue;
+    }
+    if (!is_lock(content(descriptor))) {
+      close(descriptor);
+      throw std::runtime_error(name +
+                               " is there and is no lock of a run: it stays, and nothing is run");
+    }
+    const std::string self = fmt::format("{}\n", getpid());
+    if (ftruncate(descriptor, 0) != 0 || write(descriptor, self.data(), self.size()) < 0) {
+      // Only for the message to a run that is refused.
+    }
+    held_.push_back({name, descriptor});
+    return;
+  }
+}
+
+OutputLock::~OutputLock() {
+  for (const Held& each : held_) {
+    unlink(each.name.c_str());  // while it is held, see is_there
+    close(each.descriptor);
+  }
+}
+
+}  // namespace tether::scene

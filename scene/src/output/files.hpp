@@ -1,0 +1,96 @@
+// Tether: files that are whole or absent. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tether::scene {
+
+/// Somebody does not want to wait for the other end of a pipe.
+struct Interrupted : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// A descriptor that is closed in the end.
+struct Open {
+  int descriptor;
+  ~Open();
+};
+
+/// open(2) with O_WRONLY and these flags. A pipe without a reader is waited for until a signal
+/// comes that somebody handles: Interrupted.
+int open_to_write(const std::string& file, int flags);
+
+/// Makes the folder of a file. Throws std::runtime_error.
+void make_folder_of(const std::string& file);
+
+/// Replaces the file atomically: a reader finds the old content or all of the new one, also after a
+/// loss of power. A target that is not a regular file (/dev/stdout) is written to. Throws
+/// std::runtime_error.
+void write_whole(const std::string& file, std::string_view content);
+
+/// The same, but an existing target must be a regular file.
+void write_whole_regular(const std::string& file, std::string_view content);
+
+/// A file that nobody reads before the run has named it elsewhere: gone again where it could not be
+/// written. What had its name is removed first. Throws std::runtime_error.
+void write_fresh(const std::string& file, std::string_view content);
+
+/// The same where nothing has the name; what has it stays, and std::runtime_error says so.
+void write_new(const std::string& file, std::string_view content);
+
+/// The error of `write_whole` before the work is done; makes the folder.
+void check_writable(const std::string& file);
+
+/// A file to which whole rows are added. Where the disk is full or the run ends early it is cut
+/// back to its last whole row; rows leave together, so that a run that is killed leaves whole ones,
+/// too.
+class RowFile {
+ public:
+  /// Makes its folder. The first `kept` bytes of a file that is there stay and are safe at every
+  /// instant; 0: it is a new one. Throws std::runtime_error, as all of these.
+  RowFile(std::string file, std::size_t kept);
+  ~RowFile();
+  RowFile(const RowFile&) = delete;
+  RowFile& operator=(const RowFile&) = delete;
+
+  /// One or more rows, each with its end.
+  void put(std::string_view rows);
+  void flush();
+  /// Makes what was put outlast a loss of power.
+  void keep();
+  const std::string& name() const { return file_; }
+
+ private:
+  [[noreturn]] void fail();
+
+  std::string file_, waiting_;
+  int descriptor_;
+  std::size_t size_;  // of the rows in the file
+};
+
+/// Holds FILE.lock for each file that a run writes. The system lets go of it when the process ends,
+/// however it ends: a lock file that is left behind locks nothing.
+class OutputLock {
+ public:
+  OutputLock() = default;
+  ~OutputLock();
+  OutputLock(const OutputLock&) = delete;
+  OutputLock& operator=(const OutputLock&) = delete;
+
+  /// Throws std::runtime_error if another run writes the file now. Makes its folder. Files that are
+  /// no regular files (/dev/null) have no lock, nor have folders without locks (some networks).
+  void take(const std::string& file);
+
+ private:
+  struct Held {
+    std::string name;
+    int descriptor;
+  };
+  std::vector<Held> held_;
+};
+
+}  // namespace tether::scene

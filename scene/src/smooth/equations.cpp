@@ -1,0 +1,251 @@
+// Tether: the residual of the equations of motion. SPDX-License-Identifier: BSD-3-Clause
+#include "mechanics/frames.hpp"
+#include "system.hpp"
+
+namespace tether::scene::smooth {
+
+void System::sum_forces(Stopwatch* watch) {
+  for (Load6& load : loads_) load.force = load.torque_body = load.torque_world = Vector3d::Zero();
+  for (std::size_t i = 0; i < forces_.size(); ++i) {
+    forces_[i]->add(bodies_.all(), loads_);
+    if (watch) watch->lap(i);
+  }
+}
+
+void System::add_multipliers(const double* lambda, std::vector<Load6>& loads) const {
+  const Bodies& bodies = bodies_.all();
+  rows_.each([&](const auto& row) {
+    const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
+    Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
+    row.pull(A, B, lambda + row.row, a, b);
+    const auto put = [&](int body, const Wrench<double>& wrench) {
+      const int slot = bodies.inertia[at(body)].slot;
+      if (slot < 0) return;
+      loads[at(slot)].force += wrench.force;
+      loads[at(slot)].torque_world += wrench.torque;
+    };
+    put(row.first, a);
+    put(row.second, b);
+  });
+}
+
+void System::torques_to_body_axes(std::vector<Load6>& loads) const {
+  for (int k = 0; k < moving(); ++k) {
+    Load6& load = loads[at(k)];
+    load.torque_body += bodies_.frame(k).R.transpose() * load.torque_world;
+  }
+}
+
+double System::power(const double* lambda) const {
+  double sum = 0;
+  for (const auto& force : forces_)
+    if (force->has_power()) sum += force->power(bodies_.all());
+  if (rows_.has_motion())
+    rows_.each([&](const auto& row) {
+      double g_t[3];
+      row.rate_by_time(g_t);
+      for (int i = 0; i < row.count; ++i) sum -= lambda[row.row + i] * g_t[i];
+    });
+  return sum;
+}
+
+// In the place of a row that depends on others: its multiplier is 0.
+void System::pin_multipliers(const double* multipliers, double* rows) const {
+  for (int i = 0; i < rows_.count(); ++i)
+    if (!in_use_.carries_multiplier(i)) rows[i] = dynamics_.size_of_row()[i] * multipliers[i];
+}
+
+// x' - v, q' - q (0, w) / 2 and M (v', w') - f of every body.
+void System::add_motion_residual(const double* y, const double* yp, double* r) const {
+  using Map3 = Eigen::Map<const Vector3d>;
+  using Map6 = Eigen::Map<const Eigen::Matrix<double, 6, 1>>;
+  for (int k = 0; k < moving(); ++k) {
+    const Inertia& inertia = bodies_.inertia(k);
+    const double *s = y + kBody * k, *p = yp + kBody * k;
+    double* out = r + kBody * k;
+    Vector3d v = Map3(s + kVelocity), w = Map3(s + kSpin);
+    if (form_ == Formulation::stabilised_index2) {
+      v += pulls_[at(k)].force / inertia.mass;
+      w += inertia.inverse * pulls_[at(k)].torque_body;
+    }
+    Eigen::Map<Vector3d>(out + kPosition) = Map3(p + kPosition) - v;
+    Eigen::Map<Eigen::Vector4d>(out + kQuaternion) =
+        Eigen::Map<const Eigen::Vector4d>(p + kQuaternion) - quaternion_rate(s + kQuaternion, w);
+    if (form_ == Formulation::index0) {
+      Eigen::Map<Eigen::Matrix<double, 6, 1>>(out + kVelocity) =
+          Map6(p + kVelocity) - dynamics_.accelerations().segment<6>(6 * k);
+    } else {
+      Eigen::Map<Vector3d>(out + kVelocity) =
+          inertia.mass * Map3(p + kVelocity) - loads_[at(k)].force;
+      Eigen::Map<Vector3d>(out + kSpin) =
+          inertia.inertia * Map3(p + kSpin) - loads_[at(k)].torque_body;
+    }
+  }
+}
+
+void System::add_row_residual(const double* y, const double* yp, double* r) {
+  double* out = r + first_multiplier();
+  if (form_ == Formulation::stabilised_index2) {
+    double* positions = r + first_eta();
+    rows_.values<1>(bodies_.all(), out);
+    rows_.values<0>(bodies_.all(), positions);
+    pin_multipliers(y + first_eta(), positions);
+  } else {
+    bodies_.set_accelerations(yp);
+    rows_.values<2>(bodies_.all(), out);
+  }
+  pin_multipliers(y + first_multiplier(), out);
+}
+
+void System::residual(double t, const double* y, const double* yp, double* r, Stopwatch* watch) {
+  const std::size_t joints = forces_.size(), bodies = joints + 1;
+  const double* lambda = y + first_multiplier();
+  if (watch) watch->start();
+  update(t, y);
+  if (watch) watch->lap(bodies);
+  sum_forces(watch);
+
+  const bool index0 = form_ == Formulation::index0;
+  if (index0) {
+    torques_to_body_axes(loads_);
+    if (watch) watch->lap(bodies);
+    dynamics_.solve(loads_);
+    lambda = dynamics_.multipliers().data();
+    if (watch) watch->lap(joints);
+  } else {
+    if (rows() > 0) add_multipliers(lambda, loads_);
+    torques_to_body_axes(loads_);
+    if (form_ == Formulation::stabilised_index2) {
+      for (Load6& pull : pulls_)
+        pull.force = pull.torque_body = pull.torque_world = Vector3d::Zero();
+      add_multipliers(y + first_eta(), pulls_);
+      torques_to_body_axes(pulls_);
+    }
+    if (watch) watch->lap(joints);
+  }
+  add_motion_residual(y, yp, r);
+  if (invariants_.has_work()) r[first_work()] = yp[first_work()] - power(lambda);
+  if (watch) watch->lap(bodies);
+  if (index0 || rows() == 0) return;
+  add_row_residual(y, yp, r);
+  if (watch) watch->lap(joints);
+}
+
+namespace {
+
+// x' - v and q' - q (0, w) / 2 of the body whose unknowns are from `first` on.
+void add_kinematic_jacobian(JacobianBlocks& J, int first, double cj, const double* q,
+                            const Vector3d& w) {
+  for (int i = 0; i < 3; ++i) {
+    J.add(first + i, first + i, cj);
+    J.add(first + i, first + kVelocity + i, -1.0);
+  }
+  const Eigen::Matrix4d Q = cj * Eigen::Matrix4d::Identity() - rate_by_quaternion(w);
+  const Eigen::Matrix<double, 4, 3> W = -rate_by_spin(q);
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) J.add(first + kQuaternion + i, first + kQuaternion + j, Q(i, j));
+    for (int j = 0; j < 3; ++j) J.add(first + kQuaternion + i, first + kSpin + j, W(i, j));
+  }
+}
+
+}  // namespace
+
+// eta moves x and q; its own size is that of the drift, so that d(G^T)/dq eta is left out.
+void System::add_eta_jacobian(JacobianBlocks& J, const double* y) const {
+  const Bodies& bodies = bodies_.all();
+  rows_.each([&](const auto& row) {
+    JointRows::each_unit_load(
+        row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+          const Inertia& inertia = bodies.inertia[at(body)];
+          const int first = kBody * inertia.slot;
+          const Vector3d spin = inertia.inverse * torque;
+          const Eigen::Vector4d turn = quaternion_rate(y + first + kQuaternion, spin);
+          for (int k = 0; k < 3; ++k)
+            J.add(first + k, first_eta() + row.row + i, -force[k] / inertia.mass);
+          for (int k = 0; k < 4; ++k)
+            J.add(first + kQuaternion + k, first_eta() + row.row + i, -turn[k]);
+        });
+  });
+}
+
+void System::pin_jacobian(JacobianBlocks& J, int first) const {
+  for (int i = 0; i < rows(); ++i)
+    J.add(first + i, first + i, in_use_.carries_multiplier(i) ? 0.0 : dynamics_.size_of_row()[i]);
+}
+
+void System::jacobian(double t, double cj, const double* y, const double* yp, Entries& entries) {
+  update(t, y);
+  bodies_.set_turns(y);
+  if (form_ == Formulation::index0) {
+    index0_jacobian(cj, y, entries);
+    return;
+  }
+  bodies_.set_accelerations(yp);
+  const bool index2 = form_ == Formulation::stabilised_index2;
+  JacobianBlocks J(entries, bodies_.all().turns, kBody, kVelocity, first_work());
+  for (int k = 0; k < moving(); ++k) {
+    const Inertia& inertia = bodies_.inertia(k);
+    const int first = kBody * k;
+    Vector3d w = bodies_.spin(k);
+    if (index2) w += inertia.inverse * pulls_[at(k)].torque_body;
+    add_kinematic_jacobian(J, first, cj, y + first + kQuaternion, w);
+    for (int i = 0; i < 3; ++i)
+      J.add(first + kVelocity + i, first + kVelocity + i, cj * inertia.mass);
+    J.add_block(first + kSpin, first + kSpin, cj * inertia.inertia);
+  }
+  terms_.add_motion(J, y + first_multiplier(), first_multiplier());
+  if (invariants_.has_work()) {
+    J.add(first_work(), first_work(), cj);
+    terms_.add_power(J);
+    if (rows_.has_motion())
+      rows_.each([&](const auto& row) {
+        double g_t[3];
+        row.rate_by_time(g_t);
+        for (int i = 0; i < row.count; ++i)
+          J.add(first_work(), first_multiplier() + row.row + i, g_t[i]);
+      });
+  }
+  pin_jacobian(J, first_multiplier());
+  if (!index2) {
+    terms_.add_rows<2>(J, first_multiplier(), &in_use_, true, cj);
+    return;
+  }
+  terms_.add_rows<1>(J, first_multiplier(), &in_use_, false, 0.0);
+  terms_.add_rows<0>(J, first_eta(), &in_use_, false, 0.0);
+  pin_jacobian(J, first_eta());
+  add_eta_jacobian(J, y);
+}
+
+void System::index0_jacobian(double cj, const double* y, Entries& entries) {
+  sum_forces(nullptr);
+  torques_to_body_axes(loads_);
+  dynamics_.solve(loads_);
+  dynamics_.set_accelerations();
+  acceleration_jacobian_->form();
+  const Eigen::MatrixXd& da = acceleration_jacobian_->accelerations();
+  const int columns = kBody * moving();
+  JacobianBlocks J(entries, bodies_.all().turns, kBody, kVelocity, first_work());
+  for (int k = 0; k < moving(); ++k) {
+    const int first = kBody * k;
+    add_kinematic_jacobian(J, first, cj, y + first + kQuaternion, bodies_.spin(k));
+    for (int i = 0; i < 6; ++i) {
+      for (int column = 0; column < columns; ++column)
+        J.add(first + kVelocity + i, column,
+              (column == first + kVelocity + i ? cj : 0.0) - da(6 * k + i, column));
+    }
+  }
+  if (!invariants_.has_work()) return;
+  J.add(first_work(), first_work(), cj);
+  terms_.add_power(J);
+  if (!rows_.has_motion()) return;
+  const Eigen::MatrixXd& dlambda = acceleration_jacobian_->multipliers();
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(columns);
+  rows_.each([&](const auto& row) {
+    double g_t[3];
+    row.rate_by_time(g_t);
+    for (int i = 0; i < row.count; ++i) sum += g_t[i] * dlambda.row(row.row + i);
+  });
+  for (int column = 0; column < columns; ++column) J.add(first_work(), column, sum[column]);
+}
+
+}  // namespace tether::scene::smooth
