@@ -220,18 +220,16 @@ std::size_t count(const std::string& text, const std::string& part) {
 
 }  // namespace
 
-TEST_CASE("every shipped scene stands in the README of the examples, and they are counted right") {
+TEST_CASE("every shipped scene stands in the README of the examples, and that in the first one") {
   const fs::path scenes = TETHER_SHIPPED_SCENES;
   const std::string listed = content(scenes.parent_path() / "README.md");
-  int number = 0;
   for (const auto& entry : fs::directory_iterator(scenes)) {
     if (entry.path().extension() != ".toml") continue;
     INFO(entry.path());
     CHECK(count(listed, "(scenes/" + entry.path().filename().string() + ")") > 0);
-    ++number;
   }
   CHECK(count(content(scenes.parent_path().parent_path() / "README.md"),
-              "[" + std::to_string(number) + " scenes](examples/README.md)") == 1);
+              "[Scenes](examples/README.md)") == 1);
 }
 
 TEST_CASE("texts of a scene stay texts in its picture") {

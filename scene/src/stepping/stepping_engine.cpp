@@ -105,7 +105,7 @@ void exchange(Archive& io, int bodies, StepperMemory& m) {
   demand_not_negative({m.cuts}, "steps are cut at no impacts");
 }
 
-// Of what a state cannot do without: the same bodies and step. Whether the rest of the scene is the
+// A state cannot do without the same bodies and step. Whether the rest of the scene is the
 // same is looked at by who keeps the file.
 std::uint64_t fingerprint(const Scene& scene, double step) {
   std::string text(reinterpret_cast<const char*>(&step), sizeof step);

@@ -12,7 +12,7 @@ symbols(${MINIMUM} minimum)
 symbols(${EVERYTHING} everything)
 # Inner loops of friction, the laws and the stages that use them, restitution, joints.
 set(effects "anonymous namespace.::body_sweep" "anonymous namespace.::plain_sweep" sweep_spheres "Restitution::limit_energy" "contact_cone"
-  "InteriorPoint|interior_point" "left_jacobian|solve_step" "Solver::Implementation::automatic")
+  "InteriorPoint|interior_point" "left_jacobian|solve_step" "Automatic::at_round_off")
 if(WHOLE MATCHES "tether_scene")
   list(APPEND effects "tether::scene::smooth::")
 endif()
