@@ -163,7 +163,7 @@ TEST_CASE("mass ratios: a stack that is pushed as a whole is solved") {
         finer.tolerance = 1e-7;
         const Solution solution = Solver(finer).solve(p);
         INFO(name(solution.status) << " " << solution.error << " " << solution.counts.work);
-        CHECK(solution.error < 7e-7);
+        CHECK(solution.error < 4e-7);  // 9e-7
         CHECK(solution.counts.work < 3e8);
       }
 }
@@ -334,4 +334,18 @@ TEST_CASE("mass ratios: stacks of 1 : 1e6 whose boxes move and spin") {
 // Their paths turn; without the arclength none is solved within this work.
 TEST_CASE("mass ratios: stacks that move and spin are solved by paths that turn") {
   CHECK(solve_moving({{100, 0, 8}, {100, 1, 6}, {200, 0, 2}, {200, 0, 7}}) < 2.5e9);  // 4e9
+}
+
+// Interior points solved all but two to ten contacts that part, whose x.u is below the round-off of
+// that of contacts on which heavy bodies lie. All ended as round_off at 1.3e-6 to 2.6e-6, twenty
+// times above it, for 3.3e9.
+TEST_CASE("mass ratios: stacks that move and spin, down to round-off") {
+  CHECK(solve_moving({{200, 1, 29}, {200, 0, 1012}, {200, 0, 1027}, {200, 0, 2012}, {200, 0, 2013}},
+                     0) < 1e9);
+}
+
+// Impulses are 1e7 times what moves, and x drifts by as much until a contact changes: with tau no
+// smaller than for other problems all three took all of the work for 1.5e-6 to 5e-6.
+TEST_CASE("mass ratios: stacks that move and spin are solved by a proximal path that goes far") {
+  CHECK(solve_moving({{100, 0, 132}, {100, 1, 5003}, {200, 1, 77}}, 0) < 1.5e9);  // 6.8e8
 }

@@ -31,6 +31,9 @@ class Automatic {
   void proximal_path(Search& search);
   void interior_points(Search& search, bool by_bodies);
   void proximal_path_at_best(Search& search);
+  void solve_parts_of_end(Search& search);
+  void follow_to_the_end(Search& search);
+  void proximal_path_from_small(Search& search);
   bool infeasible(Search& search);
   bool at_round_off(Search& search);
   Status give_up(Search& search);
@@ -39,7 +42,7 @@ class Automatic {
   AcceleratedSweeps sweeps_;
   ProximalNewton newton_;
   InteriorPoint interior_;
-  LocalSolves parts_;
+  LocalSolves parts_, end_parts_;
   Packed x_, z_, pressed_;
   int contacts_ = 0;
   bool ready_ = false, proofs_ = true, looked_for_proof_ = false;

@@ -26,6 +26,9 @@ struct Proximal {
   const PackedVector* anchor = nullptr;
 };
 
+// Loads (System::load) above this are those of heavy bodies on light ones.
+constexpr double kOrdinaryLoad = 1e3;
+
 // A problem together with the law for each contact. Kernels are built for the machine at hand.
 class System {
  public:
@@ -90,6 +93,8 @@ class System {
   // Rounding of w = A x - b, relative to the velocity scale of the island: the largest component of
   // u |A| |x|. A residual below it says nothing.
   double rounding(const PackedVector* x) const;
+  // |A| |x| relative to the velocity scale: 10 to 1000 between bodies of similar masses.
+  double load(const PackedVector* x) const { return rounding(x) / kRoundOff; }
   // 1 / velocity scale of the island of contact i.
   double inverse_scale(int i) const { return inverse_scale_[at(i)]; }
   int islands() const { return static_cast<int>(needed_.size()); }

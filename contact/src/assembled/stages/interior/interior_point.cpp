@@ -41,6 +41,15 @@ void InteriorPoint::stick(Search& search) {
   if (sticking_.found() && sticking_.outside() <= 0) equations_.set_exact(search.near_round_off());
 }
 
+double InteriorPoint::size_over_sticking(Search& search, const PackedVector* x) {
+  stick(search);
+  if (!sticking_.found() || !(sticking_.size() > 0)) return 0;
+  double size = 0;
+  for (int i = 0; i < n_; ++i)
+    size += std::abs(search.system.friction(i) * x[i].v[0]) + std::hypot(x[i].v[1], x[i].v[2]);
+  return size / sticking_.size();
+}
+
 // The point where everything sticks, shifted into the cone; false if it is the solution or cannot
 // be found.
 bool InteriorPoint::start(Search& search) {

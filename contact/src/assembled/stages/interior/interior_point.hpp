@@ -15,15 +15,21 @@ class InteriorPoint {
   void reset(int contacts);
   // Tests the point where everything sticks, which run() starts from: one factorisation.
   void stick(Search& search);
+  // The size of impulses over that of those by which everything sticks; 0: none are known.
+  double size_over_sticking(Search& search, const PackedVector* x);
   // From the point where everything sticks; at most `most` steps. The result is search.best.
   void run(Search& search, int most);
+  // From the last point of a run, and that point.
+  void go_on(Search& search, int most) { follow(search, most, 0); }
+  const Packed& impulses() const { return equations_.impulses(); }
   // From near x.
   void run_near(Search& search, const PackedVector* x, int most);
   // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
   // tau D makes solvable where the path of the problem itself ends. Each is solved by a few steps
   // of `newton` from the point to which the last step leads or, where that fails, along its own
-  // path.
-  void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton);
+  // path. whole: where one cannot be solved a larger tau is tried, else it ends there.
+  void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton,
+                    bool whole = false);
   // The path of run() by its arclength, through the turns where its steps are blocked; `newton`
   // finishes. At most `most` factorisations.
   void run_arclength(Search& search, int most, ProximalNewton& newton);

@@ -9,15 +9,19 @@ namespace tether::contact::detail {
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
 // solution, x drifts at a constant rate until one of them changes (method, section 6).
 void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
-                                 ProximalNewton& newton) {
+                                 ProximalNewton& newton, bool whole) {
   constexpr int kCorrections = 4, kSteps = 20, kSweeps = 3;
-  constexpr double kFirst = 1e-2, kLeast = 1e-9;  // tau
-  constexpr double kNear = 1e-4;
+  constexpr double kFirst = 1e-2, kLeast = 1e-9, kMost = 1;  // tau, for ordinary loads
+  constexpr double kLightest = 1e6, kNear = 1e-4;
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
   equations_.set_anchor(x);
   const Packed& anchor = equations_.anchor();
-  double tau = kFirst;
+  // Impulses that carry heavy bodies over light ones are |A| |x| times what moves; for x to change
+  // by its size at the rate of what is left tau has to be as much smaller.
+  const double lighter = std::min(kLightest, std::max(1.0, system.load(x) / kOrdinaryLoad));
+  const double least = kLeast / lighter;
+  double tau = kFirst / lighter;
   bool drifting = false;
   for (int outer = 0; outer < most; ++outer) {
     int corrections = 0;
@@ -39,7 +43,11 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       if (search.solved()) break;
       if (found) point = equations_.impulses();
     }
-    if (search.exhausted() || !found) break;
+    if (search.exhausted() || (!found && !whole)) break;
+    if (!found) {
+      tau = std::min(kMost, 3 * tau);
+      continue;
+    }
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) rate[at(i)].v[c] = tau * (point[at(i)].v[c] - anchor[at(i)].v[c]);
     drifting = true;
@@ -53,7 +61,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
     }
     if (!search.solved()) search.test(swept_.data(), By::factors);
     if (search.solved()) break;
-    tau = std::max(kLeast, (corrections == 1 ? 0.4 : 0.5) * tau);
+    tau = std::max(least, (corrections == 1 ? 0.4 : 0.5) * tau);
   }
   equations_.set_tau(0);
 }
