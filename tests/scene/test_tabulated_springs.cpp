@@ -102,7 +102,7 @@ TEST_CASE("tables of stiffness and damping keep their closed forms by tolerance"
       const double x = run->bodies()[0].position.x() - 0.3, v = run->bodies()[0].velocity.x();
       const double pull = x > 0 ? 2.4 + 50 * x : 8 * (x + 0.3);
       CHECK(std::abs(run->forces().joints[0].drive + pull) < 1e-9);
-      CHECK(std::abs(v * v + run->diagnostics().potential_energy - 1.44) < 300 * tolerance);
+      CHECK(std::abs(v * v + run->diagnostics().potential_energy - 1.44) < 150 * tolerance);
     }
 }
 

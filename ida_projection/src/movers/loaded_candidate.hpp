@@ -16,18 +16,17 @@ class LoadedCandidate {
       : y(static_cast<std::size_t>(size), 0.0), WT_(static_cast<std::size_t>(size), 0.0) {}
 
   void load(const Candidate& candidate) {
+    base_ = candidate.base_entries;
     ycor = candidate.correction_entries;
     w = candidate.weight_entries;
     h = candidate.h;
     cj_ = candidate.cj;
     predicted_rate_ = candidate.predicted_rate;
     WT_known_ = false;
-    restart(candidate);
+    restart();
   }
   /// y for the correction as it is now.
-  void restart(const Candidate& candidate) {
-    add(candidate.base_entries, candidate.correction_entries, static_cast<int>(y.size()), y.data());
-  }
+  void restart() { add(base_, ycor, static_cast<int>(y.size()), y.data()); }
   /// 1/w. A weight of zero means that the error of this component does not count at all.
   const std::vector<double>& WT() {
     if (!WT_known_)
@@ -59,7 +58,7 @@ class LoadedCandidate {
   std::vector<double> WT_;
   bool WT_known_ = false;
   double cj_ = 0.0;
-  const double* predicted_rate_ = nullptr;
+  const double *base_ = nullptr, *predicted_rate_ = nullptr;
 };
 
 }  // namespace tether::ida_projection

@@ -33,7 +33,6 @@ class LocalMetric {
   void current(const LoadedCandidate& at, double* D) const;
   /// One scale for each of these groups, in place of Options::group.
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
-  bool by_levels() const { return !levels_.empty(); }
   void forget_levels() { levels_.clear(); }
   /// Unknowns of level 1 are the rates of those of level 0: scales obey that from now on, see
   /// limit().

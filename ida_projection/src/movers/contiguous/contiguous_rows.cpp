@@ -202,14 +202,13 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
     found.length = judge_thin_rows(alone);
     if (!moved_ && blocks_.trust.must_learn(found.length)) {
       // The firm rows' move shows how C turns; then all rows are judged, from the start.
-      const std::vector<double> start = at_.y;
       for (const Block* block : {&blocks_.d, &blocks_.a})
         if (!block->rows.empty())
           block->for_columns(
               [y = at_.y.data(), dy = block->dy.data()](int k, int i) { y[i] -= dy[k]; });
       length_ = found.length;
       found.status = learn_trust(length_);
-      at_.y = start;
+      at_.restart();
       if (found.status == Status::success) found.status = factor(t_, false);
       if (found.status != Status::success) return found;
       blocks_.solve(g_);

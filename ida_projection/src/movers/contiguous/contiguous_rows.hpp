@@ -52,7 +52,7 @@ class ContiguousRows final : public RowsAt {
   double rounding_length() override;
 
   double shift(N_Vector change) override;
-  void restart(const Candidate& candidate) override { at_.restart(candidate); }
+  void restart(const Candidate&) override { at_.restart(); }
   double drift() const override;
   bool has_factors() const override { return uses_.there; }
   void forget_factors() override { uses_.there = false; }
