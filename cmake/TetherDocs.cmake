@@ -15,11 +15,12 @@ set(DOXYGEN_HAVE_DOT NO)
 set(DOXYGEN_GENERATE_LATEX NO)
 set(DOXYGEN_QUIET YES)
 set(DOXYGEN_WARN_AS_ERROR FAIL_ON_WARNINGS)
-set(DOXYGEN_WARN_IF_UNDOCUMENTED NO)  # names and types say what a sentence would repeat
 set(DOXYGEN_MACRO_EXPANSION YES)
 set(DOXYGEN_EXPAND_ONLY_PREDEF YES)
-set(DOXYGEN_PREDEFINED TETHER_EXPORT_BEGIN= TETHER_EXPORT_END=)
-set(DOXYGEN_EXTRACT_ALL YES)
+set(DOXYGEN_PREDEFINED TETHER_EXPORT_BEGIN= TETHER_EXPORT_END= TETHER_HIDDEN=)
+set(DOXYGEN_INPUT_FILTER "${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/docs/declarations.py")
+set(DOXYGEN_EXCLUDE_SYMBOLS tether::*::detail tether::*::detail::* tether::linalg::small*)
+set(DOXYGEN_FILE_PATTERNS *.hpp *.h *.md)
 set(DOXYGEN_STRIP_FROM_PATH ${CMAKE_CURRENT_SOURCE_DIR})
 set(DOXYGEN_STRIP_FROM_INC_PATH linalg/include ida_projection/include contact/include scene/include)
 set(DOXYGEN_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/docs)
@@ -33,6 +34,18 @@ tether::scene. The [guides and tutorials](../index.html) tell how to use them.
 set(DOXYGEN_USE_MDFILE_AS_MAINPAGE ${first})
 doxygen_add_docs(reference ${first} linalg/include ida_projection/include contact/include scene/include
   COMMENT "API reference")
+# A public member without a comment is a warning, and a warning an error.
+if(TETHER_BUILD_TESTS)
+  set(doxyfile ${CMAKE_CURRENT_BINARY_DIR}/docs/Doxyfile.tested)
+  file(CONFIGURE OUTPUT ${doxyfile} CONTENT "@INCLUDE = ${CMAKE_CURRENT_BINARY_DIR}/Doxyfile.reference
+OUTPUT_DIRECTORY = ${CMAKE_CURRENT_BINARY_DIR}/docs/tested
+GENERATE_HTML = NO
+GENERATE_XML = YES
+" @ONLY)
+  add_test(NAME "docs: every public member has a comment" COMMAND Doxygen::doxygen ${doxyfile}
+    WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+  set_tests_properties("docs: every public member has a comment" PROPERTIES LABELS docs)
+endif()
 add_custom_target(docs
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/docs/pages.py ${CMAKE_CURRENT_BINARY_DIR}/docs
     ${CMAKE_CURRENT_BINARY_DIR}/docs/html

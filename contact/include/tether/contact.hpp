@@ -12,3 +12,6 @@
 #include <tether/contact/shapes.hpp>
 #include <tether/contact/solver.hpp>
 #include <tether/contact/stepping.hpp>
+
+/// Contact with friction: problems, their solvers and errors, and bodies in motion. SI units.
+namespace tether::contact {}

@@ -12,7 +12,10 @@ extern "C" {
 #pragma GCC visibility push(default)
 #endif
 
-/* A shared object of yours defines this, so that libtether_preload attaches constraints to the IDA
+/** @file
+ * Constraints by LD_PRELOAD. */
+
+/** A shared object of yours defines this, so that libtether_preload attaches constraints to the IDA
  * of a program that links SUNDIALS dynamically:
  *
  *   LD_PRELOAD=libtether_preload.so TETHER_CONSTRAINTS=./mine.so program
@@ -35,13 +38,14 @@ int tether_preload(void* ida_mem, N_Vector y, tether_constraints* constraints,
  * loaded the library by itself (dlopen with RTLD_LAZY | RTLD_GLOBAL, before what links SUNDIALS).
  */
 
-/* Projects points that IDASolve and IDAGetDky return for this IDA, too: interpolated points are off
- * the constraints by a part of the tolerance. IDA's own steps are as without. */
+/** Projects points that IDASolve and IDAGetDky return for this IDA, too: interpolated points are
+ * off the constraints by a part of the tolerance. IDA's own steps are as without. */
 int tether_preload_project_output(void* ida_mem);
 
+/** A function in place of tether_preload(), with its arguments and results. */
 typedef int (*tether_preload_fn)(void* ida_mem, N_Vector y, tether_constraints* constraints,
                                  tether_options* options);
-/* Asked in place of the object that TETHER_CONSTRAINTS names; null: that one again. */
+/** Asked in place of the object that TETHER_CONSTRAINTS names; null: that one again. */
 void tether_preload_ask(tether_preload_fn ask);
 
 #if defined(__GNUC__)

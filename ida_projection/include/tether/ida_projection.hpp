@@ -7,3 +7,6 @@
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/projection.hpp>
 #include <tether/ida_projection/statistics.hpp>
+
+/// Constraint projection inside SUNDIALS IDA.
+namespace tether::ida_projection {}

@@ -13,6 +13,7 @@
 #include <vector>
 
 TETHER_EXPORT_BEGIN
+/// IDA by reverse communication.
 namespace tether::reverse_ida {
 
 /// Why a call has returned. All but `reached` and `failed` are requests: the caller fills result()
@@ -28,6 +29,7 @@ enum class Request : int {
   constraint_jacobian,  ///< result() = dg/dy, m x N by rows; zero on entry
 };
 
+/// The enumerator as text.
 const char* to_string(Request request);
 
 /// Who solves the linear systems of Newton's method.
@@ -39,12 +41,12 @@ enum class Linear {
 
 /// F(t, y, yp) = 0 from t0 on, and the constraints g(t, y) = 0 that its solution obeys.
 struct Equations {
-  double t0 = 0.0;
-  std::vector<double> y, yp;  ///< N values each
-  double rtol = 1e-6;
-  std::vector<double> atol{1e-6};  ///< one for all, or N
+  double t0 = 0.0;                 ///< time of the initial values
+  std::vector<double> y, yp;       ///< N values each
+  double rtol = 1e-6;              ///< relative tolerance of IDA
+  std::vector<double> atol{1e-6};  ///< absolute tolerances: one for all, or N
   std::vector<double> id;          ///< IDA's id (1 differential, 0 algebraic): N values, or none
-  Linear linear = Linear::differences;
+  Linear linear = Linear::differences;  ///< who solves the linear systems
 
   int constraints = 0;              ///< m; 0: plain IDA
   std::vector<std::string> names;   ///< of the rows of g, for messages; m or none
@@ -88,14 +90,14 @@ class ReverseIda {
   /// smaller step), < 0 end the run. Throws std::logic_error if nothing was asked.
   Request go_on(int answer = 0);
 
-  Request request() const;  ///< the last one returned
-  double t() const;
-  double cj() const;          ///< of `jacobian` and `setup`
-  const double* y() const;    ///< N
-  const double* yp() const;   ///< N; null in `solve`, `constraints` and `constraint_jacobian`
-  const double* rhs() const;  ///< N; null but in `solve`
-  double* result() const;     ///< null where nothing is asked
-  std::size_t result_size() const;
+  Request request() const;          ///< the last one returned
+  double t() const;                 ///< time where IDA stands, or asks
+  double cj() const;                ///< of `jacobian` and `setup`
+  const double* y() const;          ///< N
+  const double* yp() const;         ///< N; null in `solve`, `constraints` and `constraint_jacobian`
+  const double* rhs() const;        ///< N; null but in `solve`
+  double* result() const;           ///< null where nothing is asked
+  std::size_t result_size() const;  ///< entries of result()
 
   int flag() const;             ///< of IDASolve, after `reached` and `failed`
   std::string message() const;  ///< why it failed; empty otherwise

@@ -19,3 +19,6 @@
 #include <tether/linalg/small_lu.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>
 #include <tether/linalg/symmetric_eigen.hpp>
+
+/// Linear algebra that the projection and the contact solvers share.
+namespace tether::linalg {}

@@ -12,3 +12,6 @@
 #include <tether/scene/scene.hpp>
 #include <tether/scene/vary.hpp>
 #include <tether/scene/words.hpp>
+
+/// Scenes: files, engines that move them, runs that record and judge. SI units.
+namespace tether::scene {}

@@ -15,19 +15,22 @@ namespace tether::contact {
 /// Contact at r1 from the centre of `first`, r2 from that of `second` (-1: the fixed world); the
 /// unit normal points from `second` to `first`. One of the two bodies must be able to move.
 struct PointContact {
+  /// The identity of a contact that has none.
   static constexpr std::uint64_t kNoId = ~std::uint64_t{0};
 
-  int first = 0, second = -1;
+  int first = 0, second = -1;  ///< indices of bodies; second may be -1
+  /// Arms from the centres of mass to the point, world axes, m.
   Eigen::Vector3d r1 = Eigen::Vector3d::Zero(), r2 = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  double mu = 0;  ///< 0: solved as one equation, the tangents cost nothing
-  /// Added to the normal velocity, w_n = n . (J v) + bias >= 0; a time stepper gives gap /
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, world axes
+  /// Coefficient of friction. 0: solved as one equation, the tangents cost nothing.
+  double mu = 0;
+  /// Added to the normal velocity, w_n = n . (J v) + bias >= 0, m/s; a time stepper gives gap /
   /// time_step.
   double bias = 0;
   /// Identity from one solve to the next (with `first` and `second` in the same order), unique
   /// within a solve; kNoId: never warm-started.
   std::uint64_t id = kNoId;
-  /// Added to the relative velocity, in the surface, world axes.
+  /// Added to the relative velocity, in the surface, world axes, m/s: of a belt.
   Eigen::Vector3d slip = Eigen::Vector3d::Zero();
 };
 
@@ -35,7 +38,7 @@ class SolverTeam;
 
 /// Settings of BodySolver; illegal values throw where it is made.
 struct BodyOptions {
-  Law law = Law::maximum_dissipation;
+  Law law = Law::maximum_dissipation;  ///< of every contact
   /// Wanted Residuals::fixed_point of each contact: the error of its velocity over the largest
   /// velocity that a contact of its island needs.
   double tolerance = 1e-6;
@@ -68,7 +71,7 @@ struct BodyOptions {
 /// Start of the next solve: the impulses of the last one and the ids of their contacts, in the
 /// order of that solve.
 struct WarmStart {
-  std::vector<std::uint64_t> ids;
+  std::vector<std::uint64_t> ids;         ///< PointContact::id
   std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`, N s
 };
 
@@ -76,14 +79,16 @@ struct WarmStart {
 struct BodySolution {
   Status status = Status::unsolved;  ///< solved if all islands are, else that of the worst
   double error = Residuals::kNone;   ///< as in BodyOptions::tolerance, of the worst island
+  /// Number of islands, of those that Solver was given, and of those that are not solved.
   int islands = 0, assembled_islands = 0, failed_islands = 0;
-  int sweeps = 0, colours = 0;  ///< the most of any island
+  int sweeps = 0, colours = 0;  ///< the most of any island; colours order its sweeps
   int warm_started = 0;         ///< contacts whose id was found
   std::vector<int> replaced;    ///< as Solution::replaced
   bool spheres = false;  ///< no contact needed the general block: all spheres or frictionless
-  std::vector<Eigen::Vector3d> impulses;                        ///< world axes, on `first`
-  std::vector<Regime> regimes;                                  ///< of each contact
-  std::vector<Eigen::Vector3d> velocities, angular_velocities;  ///< after the impulses
+  std::vector<Eigen::Vector3d> impulses;  ///< world axes, on `first`
+  std::vector<Regime> regimes;            ///< of each contact
+  /// Motion of each body after the impulses, m/s and rad/s.
+  std::vector<Eigen::Vector3d> velocities, angular_velocities;
 };
 
 class RankTeam;
@@ -125,7 +130,7 @@ class BodySolver {
   void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& solution);
 
-  const BodyOptions& options() const;
+  const BodyOptions& options() const;            ///< those in force
   void set_options(const BodyOptions& options);  ///< throws std::invalid_argument; keeps the memory
 
   /// Multiplies the impulses that the next warm start will find, as for a changed time step.
@@ -137,7 +142,7 @@ class BodySolver {
   /// The complete memory from one solve to the next. Throws std::invalid_argument if the lengths
   /// of its arrays differ.
   WarmStart warm_start() const;
-  void set_warm_start(const WarmStart& start);
+  void set_warm_start(const WarmStart& start);  ///< the reverse of warm_start()
 
  private:
   struct TETHER_HIDDEN Implementation;

@@ -16,6 +16,7 @@ namespace tether::contact {
 /// One factor of the cone K of a ConeProblem: what its rows of the impulse x may be, and what that
 /// asks of their velocities w (method, section 8).
 struct Cone {
+  /// Which x and w a cone allows.
   enum class Kind : std::uint8_t {
     free,         ///< any number of rows, of any sign: w = 0 (joints)
     nonnegative,  ///< 1 row: x >= 0 complementary to w >= 0 (limits, contacts without friction)
@@ -27,31 +28,42 @@ struct Cone {
     rolling_torsional  ///< 6: normal, tangents, moment about the normal, two across it
   };
 
-  Kind kind = Kind::free;
-  int rows = 1;  ///< of x, w and b
+  Kind kind = Kind::free;  ///< decides which of the numbers below count
+  int rows = 1;            ///< of x, w and b
   /// Coefficient of friction; lengths of rolling and torsional friction, m; largest impulse.
   double mu = 0, rolling = 0, torsional = 0, bound = 0;
 
+  // One of each kind; see Kind for rows and Cone::mu for units.
+
+  /// A cone of Kind::free.
   static Cone free(int rows = 1) { return {Kind::free, rows}; }
+  /// A cone of Kind::nonnegative.
   static Cone nonnegative() { return {Kind::nonnegative, 1}; }
+  /// A cone of Kind::bounded.
   static Cone bounded(double bound) { return {Kind::bounded, 1, 0, 0, 0, bound}; }
+  /// A cone of Kind::planar.
   static Cone planar(double mu) { return {Kind::planar, 2, mu}; }
+  /// A cone of Kind::friction.
   static Cone friction(double mu) { return {Kind::friction, 3, mu}; }
+  /// A cone of Kind::torsional.
   static Cone with_torsional(double mu, double torsional) {
     return {Kind::torsional, 4, mu, 0, torsional};
   }
+  /// A cone of Kind::rolling.
   static Cone with_rolling(double mu, double rolling) { return {Kind::rolling, 5, mu, rolling}; }
+  /// A cone of Kind::rolling_torsional.
   static Cone with_rolling(double mu, double rolling, double torsional) {
     return {Kind::rolling_torsional, 6, mu, rolling, torsional};
   }
 };
 
+/// The enumerator as text.
 const char* name(Cone::Kind kind);
 
 /// Entry of a sparse matrix, counted from 0.
 struct MatrixEntry {
-  int row = 0, column = 0;
-  double value = 0;
+  int row = 0, column = 0;  ///< place
+  double value = 0;         ///< entry
 };
 
 /// w = A x - b for rows in blocks, each with its cone, in any order and of any units. A may be
@@ -78,15 +90,16 @@ class ConeProblem {
                             std::vector<Cone> cones,
                             const linalg::VectorView& compliance = linalg::VectorX());
 
-  int rows() const { return static_cast<int>(b_.size()); }
-  const std::vector<Cone>& cones() const { return cones_; }
+  int rows() const { return static_cast<int>(b_.size()); }   ///< of all cones
+  const std::vector<Cone>& cones() const { return cones_; }  ///< in the order of their rows
   /// The first of the rows of a cone.
   int first_row(int cone) const { return first_[static_cast<std::size_t>(cone)]; }
-  const linalg::VectorX& b() const { return b_; }
-  /// With the compliance. Rows ascend, columns ascend in each.
+  const linalg::VectorX& b() const { return b_; }  ///< by row
+  /// A, with the compliance. Rows ascend, columns ascend in each.
   const std::vector<MatrixEntry>& entries() const { return entries_; }
+  /// Entries row_start()[i] .. row_start()[i + 1] - 1 belong to row i; rows() + 1 numbers.
   const std::vector<int>& row_start() const { return row_start_; }
-  linalg::MatrixX dense_matrix() const;
+  linalg::MatrixX dense_matrix() const;  ///< A, rows() x rows(), with the compliance
   /// A x - b, sums in long double.
   linalg::VectorX velocities(const linalg::VectorView& impulses) const;
   /// Factor that makes the velocity of a row comparable with others. It is 1/sqrt of the mean of
@@ -117,11 +130,11 @@ ConeResiduals evaluate(const ConeProblem& problem, Law law, const linalg::Vector
 
 /// Impulses and velocities by row, and what is known of them.
 struct ConeSolution {
-  Status status = Status::unsolved;
+  Status status = Status::unsolved;      ///< whether the law holds to the tolerance
   linalg::VectorX impulses, velocities;  ///< x and w = A x - b, by row
-  ConeResiduals residuals;
-  double error = Residuals::kNone;  ///< residuals.error: what was compared with the tolerance
-  std::vector<int> replaced;        ///< blocks, as Solution::replaced: those it is not true of
+  ConeResiduals residuals;               ///< of the impulses, block by block
+  double error = Residuals::kNone;       ///< residuals.error: what was compared with the tolerance
+  std::vector<int> replaced;             ///< blocks, as Solution::replaced: those it is not true of
   /// Free rows that nothing satisfies together (status infeasible); the impulses are those of least
   /// squares then, nearly.
   std::vector<int> contradicting;
@@ -129,8 +142,8 @@ struct ConeSolution {
   std::vector<int> blocked;
   /// As Solution::infeasible_direction, by row; free rows answer to it.
   std::vector<double> infeasible_direction;
-  Counts counts;
-  std::string advice;
+  Counts counts;       ///< work of the solve
+  std::string advice;  ///< what to try when it is not solved
 };
 
 /// Solves ConeProblems by a Solver: free rows are eliminated (sparse factors of their part of A,

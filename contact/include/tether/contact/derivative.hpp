@@ -31,16 +31,18 @@ struct DerivativeOptions {
   std::vector<int> replaced;
 };
 
+/// Whether the derivative is one of a single solution.
 enum class DerivativeStatus : std::uint8_t {
   unique,       ///< of the one solution nearby
   minimum_norm  ///< impulses are not unique (hyperstatic): of all changes the least is given
 };
 
+/// The enumerator as text.
 const char* name(DerivativeStatus status);
 
 /// A contact near another regime, where only one-sided derivatives exist.
 struct Kink {
-  int contact = 0;
+  int contact = 0;                     ///< or cone
   Regime branch = Regime::separating;  ///< whose derivative is given
   Regime other = Regime::separating;   ///< the one that is as near
   double margin = 0;                   ///< distance to it over the velocity that the island needs
@@ -48,12 +50,12 @@ struct Kink {
 
 /// Whether the derivative exists, and of what.
 struct DerivativeReport {
-  DerivativeStatus status = DerivativeStatus::unique;
+  DerivativeStatus status = DerivativeStatus::unique;  ///< of the impulses
   /// Every contact is strictly open, sticking or sliding: `kinks` is empty. Otherwise the solution
   /// has one-sided derivatives only, of which one branch's is given.
   bool strictly_regular = true;
   std::vector<Regime> regimes;  ///< the branch of each contact
-  std::vector<Kink> kinks;
+  std::vector<Kink> kinks;      ///< contacts near another regime
   int unknowns = 0, rank = 0;   ///< components of touching contacts, and how many are determined
   std::vector<int> not_unique;  ///< contacts whose impulses are not determined
   /// Velocities w = A x - b are determined even where impulses are not.

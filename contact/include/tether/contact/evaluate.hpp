@@ -10,6 +10,7 @@ namespace tether::contact {
 
 /// All in the units of a velocity (impulses are multiplied by A_nn) unless said; NaN: not computed.
 struct Residuals {
+  /// A residual that was not computed.
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   double signorini = kNone;      ///< max |min(A_nn x_n, w_n)|
   double cone = kNone;           ///< max A_nn (|x_t| - mu x_n)+

@@ -24,10 +24,15 @@ Problem read_problem(const std::string& path);
 /// come last, as one free cone.
 ConeProblem read_cones(const std::string& path);
 
+/// How write_dat() stores A: every entry, or the blocks that are not zero.
 enum class DatStorage { dense, blocks };
+/// Writes a .dat that read_problem() reads back without loss. Throws std::runtime_error where the
+/// file cannot be written.
 void write_dat(const Problem& problem, const std::string& path,
                DatStorage storage = DatStorage::blocks);
+/// The same as an fclib file, with triplets. Throws std::runtime_error as above and without HDF5.
 void write_fclib(const Problem& problem, const std::string& path);
+/// Whether the library was built with HDF5.
 bool has_fclib();
 
 }  // namespace tether::contact

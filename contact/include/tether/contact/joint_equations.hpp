@@ -16,7 +16,7 @@ struct BodySet;
 class JointEquations {
  public:
   virtual ~JointEquations() = default;
-  virtual int rows() const = 0;
+  virtual int rows() const = 0;  ///< number of constraints, the same at all times
   /// g, rows() entries, in m or rad.
   virtual void values(const BodySet& bodies, double t, double* g) = 0;
   /// Adds the rows G v = -dg/dt (t alone; positions held) to `rows`, in the order of values().

@@ -23,19 +23,20 @@ class JointLaws {
  public:
   /// A law as it was added.
   struct Law {
-    int joint;           ///< number, for messages
-    bool limit;          ///< else bounded
-    double gap;          ///< m or rad
-    double restitution;  ///< 0 .. 1
-    double rate;         ///< m/s or rad/s
-    double bound;        ///< N or N m
-    double stretch = 0;  ///< m or rad
-    double stiffness = 0, damping = 0;
+    int joint;                          ///< number, for messages
+    bool limit;                         ///< else bounded
+    double gap;                         ///< m or rad
+    double restitution;                 ///< 0 .. 1
+    double rate;                        ///< m/s or rad/s
+    double bound;                       ///< N or N m
+    double stretch = 0;                 ///< m or rad
+    double stiffness = 0, damping = 0;  ///< N/m, N s/m; N m/rad, N m s/rad
 
+    /// The third kind, added by add_sprung().
     bool is_sprung() const { return stiffness > 0 || damping > 0; }
   };
 
-  void clear();
+  void clear();  ///< removes all laws
   /// `gap`: way to the limit, < 0 beyond it. Throws std::invalid_argument, as the others, on values
   /// that are not finite or out of their range.
   void add_limit(int joint, double gap, double restitution);
@@ -48,7 +49,8 @@ class JointLaws {
   /// world, is ignored.
   void on(int body, const Vector6d& G);
 
-  int count() const { return rows_.count(); }
+  int count() const { return rows_.count(); }  ///< number of laws
+  /// In the order in which they were added, from 0.
   const Law& operator[](int law) const { return laws_[static_cast<std::size_t>(law)]; }
   const JointRows& rows() const { return rows_; }  ///< one for each law
 

@@ -23,7 +23,7 @@ using linalg::PackedVector;
 
 /// 3 x 3 block of A between two contacts, counted from 0; 1/kg.
 struct MatrixBlock {
-  int row = 0, column = 0;
+  int row = 0, column = 0;                          ///< contacts
   Eigen::Matrix3d value = Eigen::Matrix3d::Zero();  ///< planar: the upper left 2x2 part counts
 };
 
@@ -43,19 +43,24 @@ class Problem {
   static Problem sparse(int dimension, std::vector<MatrixBlock> blocks, const linalg::VectorView& b,
                         const linalg::VectorView& mu);
 
+  /// Number of contacts.
   int contacts() const { return static_cast<int>(local_.size()); }
   int dimension() const { return dimension_; }  ///< 3, or 2 in the plane
+  /// By contact, then component; m/s.
   const linalg::VectorX& b() const { return b_; }
+  /// Coefficient of friction of a contact.
   double mu(int contact) const { return local_[static_cast<std::size_t>(contact)].mu; }
+  /// Factors of the diagonal block of a contact.
   const LocalBlock& local(int contact) const { return local_[static_cast<std::size_t>(contact)]; }
-  linalg::MatrixX dense_matrix() const;
+  linalg::MatrixX dense_matrix() const;  ///< A, dimension * contacts rows
 
-  /// Block rows, columns ascending, pattern symmetric, diagonal present.
+  /// A by block rows, columns ascending, pattern symmetric, diagonal present. Those of row i are
+  /// row_start()[i] .. row_start()[i + 1] - 1 of columns() and blocks().
   const std::vector<int>& row_start() const { return row_start_; }
-  const std::vector<int>& columns() const { return columns_; }
-  const std::vector<PackedBlock>& blocks() const { return blocks_; }
-  const std::vector<LocalBlock>& locals() const { return local_; }
-  const std::vector<PackedVector>& packed_b() const { return packed_b_; }
+  const std::vector<int>& columns() const { return columns_; }        ///< see row_start()
+  const std::vector<PackedBlock>& blocks() const { return blocks_; }  ///< see row_start()
+  const std::vector<LocalBlock>& locals() const { return local_; }    ///< local() of each contact
+  const std::vector<PackedVector>& packed_b() const { return packed_b_; }  ///< pack(b())
   /// The same in other units, exactly: in island k, A times 2^mass[k] and b times 2^speed[k].
   Problem rescaled(const std::vector<int>& mass, const std::vector<int>& speed) const;
   /// Some contacts alone. std::invalid_argument where they do not ascend within the problem.
@@ -66,10 +71,12 @@ class Problem {
 
   /// Its factors where delassus() has made it, else null; the solver's own.
   const detail::BodyForm* body_form() const { return body_form_.get(); }
+  /// For delassus().
   void set_body_form(std::shared_ptr<const detail::BodyForm> form) { body_form_ = std::move(form); }
 
-  /// dimension * contacts entries as one padded vector a contact, and back.
+  /// dimension * contacts entries as one padded vector a contact.
   std::vector<PackedVector> pack(const linalg::VectorView& x) const;
+  /// The reverse of pack().
   void unpack(const std::vector<PackedVector>& x, linalg::VectorX& out) const;
 
  private:

@@ -14,13 +14,14 @@ namespace tether::contact {
 /// All of them call the same functions in the same order.
 class RankMessages {
  public:
+  /// A partner of exchange().
   struct With {
-    int rank;
+    int rank;                     ///< of the other side
     std::vector<double> out, in;  ///< of fixed length, which both sides know
   };
   virtual ~RankMessages() = default;
-  virtual int size() const = 0;
-  virtual int rank() const = 0;
+  virtual int size() const = 0;  ///< number of processes
+  virtual int rank() const = 0;  ///< of this process
   /// Sends `out` to and fills `in` from each of these; an empty one is no message.
   virtual void exchange(std::vector<With>& with) = 0;
   /// The sum over all ranks, which is exact: at most one gives anything but 0.
@@ -28,6 +29,7 @@ class RankMessages {
   /// The numbers of all ranks, counts[rank] of each, one after the other, for `root`.
   virtual void gather(int root, const std::vector<double>& mine, const std::vector<int>& counts,
                       std::vector<double>& all) = 0;
+  /// values <- those of `root`, as many on all ranks.
   virtual void broadcast(int root, std::vector<double>& values) = 0;
   /// Ends all processes: this one cannot go on while others wait for it.
   [[noreturn]] virtual void give_up(const char* why) = 0;
@@ -47,9 +49,8 @@ class RankTeam final : public SolverTeam {
   bool solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              const std::vector<const Eigen::Vector3d*>& starts, const BodyOptions& options,
              BodySolution& solution) override;
-  /// Problems that were shared, and contacts of them that this process swept.
-  long problems() const;
-  long swept_contacts() const;
+  long problems() const;        ///< problems that were shared
+  long swept_contacts() const;  ///< contacts of them that this process swept
 
  private:
   struct TETHER_HIDDEN Implementation;

@@ -10,6 +10,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
+/// Kinds of shapes; all but planes and meshes may move.
 enum class ShapeKind : std::uint8_t {
   sphere,
   plane,
@@ -22,33 +23,39 @@ enum class ShapeKind : std::uint8_t {
   mesh
 };
 
+/// All of them.
 inline constexpr std::array<ShapeKind, 9> kShapeKinds{
     ShapeKind::sphere,    ShapeKind::plane,    ShapeKind::box,
     ShapeKind::capsule,   ShapeKind::convex,   ShapeKind::points,
     ShapeKind::ellipsoid, ShapeKind::cylinder, ShapeKind::mesh};
 
+/// The enumerator as text.
 const char* name(ShapeKind kind);
 
 /// Given in the axes of its body; `position` and `orientation` place it on the body.
 struct Shape {
-  ShapeKind kind = ShapeKind::sphere;
-  double radius = 0;  ///< sphere, capsule, cylinder: m
+  ShapeKind kind = ShapeKind::sphere;  ///< decides which of the numbers below count
+  double radius = 0;                   ///< sphere, capsule, cylinder: m
   double length = 0;  ///< axis z; capsule: between the centres of its caps, cylinder: whole, m
   Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box: full edges, ellipsoid: half axes, m
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< plane: unit, out of the half-space
   std::vector<Eigen::Vector3d> points;  ///< convex, mesh: vertices; points: touching points
   /// mesh: indices of its points, counterclockwise seen from outside, where the bodies are.
   std::vector<std::array<int, 3>> triangles;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  linalg::Quaternion orientation = linalg::Quaternion::Identity();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of its origin, m
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; shape to body
 
-  /// Lengths in m, > 0, here and below; a Stepper refuses others. The normal leads out of the solid
-  /// half space; sizes of boxes are full edges. A capsule's length is between the centres of its
-  /// caps, along z. A convex shape is the hull of its vertices.
+  // Lengths in m, > 0; a Stepper refuses others.
+
+  /// Centred at the origin, as boxes, capsules, ellipsoids and cylinders.
   static Shape sphere(double radius);
+  /// Through the origin; the normal leads out of the solid half space.
   static Shape plane(const Eigen::Vector3d& normal);
+  /// Full edges along x, y and z.
   static Shape box(const Eigen::Vector3d& size);
+  /// `length` is between the centres of its caps, along z.
   static Shape capsule(double radius, double length);
+  /// The hull of its vertices.
   static Shape convex(std::vector<Eigen::Vector3d> vertices);
   /// Half axes along x, y and z.
   static Shape ellipsoid(const Eigen::Vector3d& half_axes);
@@ -66,22 +73,23 @@ struct Shape {
 
 /// World position and orientation of a shape.
 struct Pose {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< of its origin, m
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< shape to world
 };
 
 /// One point at which two shapes are near. World coordinates.
 struct NearPoint {
-  Eigen::Vector3d on_first, on_second;
-  Eigen::Vector3d normal;     ///< unit, from second to first
-  double gap = 0;             ///< along the normal; < 0: penetration
+  Eigen::Vector3d on_first, on_second;  ///< the nearest points of both, m
+  Eigen::Vector3d normal;               ///< unit, from second to first
+  double gap = 0;                       ///< along the normal; < 0: penetration
   std::uint16_t feature = 0;  ///< the same from step to step while the same features touch
 };
 
 /// The points of one pair, in storage that is used again: set `count` to 0 before.
 struct NearPoints {
   std::vector<NearPoint> point;  ///< the first `count` of them
-  int count = 0;
+  int count = 0;                 ///< points that hold
+  /// Appends a point; see NearPoint.
   void add(const Eigen::Vector3d& on_first, const Eigen::Vector3d& on_second,
            const Eigen::Vector3d& normal, double gap, int feature) {
     if (count == static_cast<int>(point.size())) point.resize(2 * point.size() + 8);

@@ -18,6 +18,7 @@ enum class Measure : std::uint8_t {
   natural_map   ///< as Siconos; depends on the units of A and b: for comparisons only
 };
 
+/// How a solve ended.
 enum class Status : std::uint8_t {
   unsolved,    ///< not tried, or the impulses lie outside of the range of doubles in these units
   solved,      ///< measure <= tolerance, and round-off of A x - b does not exceed it
@@ -29,14 +30,16 @@ enum class Status : std::uint8_t {
   infeasible   ///< no impulses keep every w_n >= 0, see Solution::infeasible_direction
 };
 
+/// The enumerator as text.
 const char* name(Measure measure);
+/// The enumerator as text.
 const char* name(Status status);
 
 /// Settings of Solver and ConeSolver; illegal values throw where these are made.
 struct Options {
-  Law law = Law::maximum_dissipation;
-  double tolerance = 1e-9;  ///< measure <= tolerance ends the solve; > 0
-  Measure measure = Measure::fixed_point;
+  Law law = Law::maximum_dissipation;      ///< of every contact
+  double tolerance = 1e-9;                 ///< measure <= tolerance ends the solve; > 0
+  Measure measure = Measure::fixed_point;  ///< what is compared with the tolerance
   /// true: the law is never replaced. false: where maximum_dissipation does not converge, contacts
   /// with eccentricity > 0.98 get the Coulomb rule in a second attempt; Solution::replaced lists
   /// them.
@@ -49,9 +52,10 @@ struct Options {
 
 /// Work of a solve.
 struct Counts {
-  int sweeps = 0, factorisations = 0;
-  double work = 0;  ///< estimated nanoseconds
+  int sweeps = 0, factorisations = 0;  ///< of all contacts; of sparse matrices
+  double work = 0;                     ///< estimated nanoseconds
 
+  /// Adds the work of another solve.
   void add(const Counts& other) {
     sweeps += other.sweeps;
     factorisations += other.factorisations;
@@ -61,15 +65,15 @@ struct Counts {
 
 /// Impulses (N s), velocities (m/s) and what is known of them; entries by contact, then component.
 struct Solution {
-  Status status = Status::unsolved;
+  Status status = Status::unsolved;      ///< whether the law holds to the tolerance
   linalg::VectorX impulses, velocities;  ///< x and w = A x - b
-  std::vector<Regime> regimes;
+  std::vector<Regime> regimes;           ///< of each contact
   std::vector<int> replaced;  ///< contacts with the Coulomb rule instead of maximum_dissipation
   double error = Residuals::kNone;  ///< the measure that was compared with the tolerance
   /// Status::infeasible: normal impulses d >= 0 (dimension * contacts entries, the largest 1) with
   /// A d = 0 to round-off and b.d > 0, so that d.w = -b.d < 0 whatever the impulses. Else empty.
   std::vector<double> infeasible_direction;
-  Counts counts;
+  Counts counts;       ///< work of the solve
   std::string advice;  ///< what to try when it is not solved
 };
 
@@ -89,7 +93,7 @@ class Solver {
   /// The same, into storage that is used again.
   void solve(const Problem& problem, Solution& solution);
 
-  const Options& options() const;
+  const Options& options() const;  ///< those given at the start
 
  private:
   struct TETHER_HIDDEN Implementation;

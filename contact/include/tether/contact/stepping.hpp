@@ -25,9 +25,11 @@ enum class Gyroscopic : std::uint8_t {
   momentum        ///< keeps angular momentum and energy to round-off
 };
 
+/// All of them.
 inline constexpr std::array<Gyroscopic, 4> kGyroscopics{
     Gyroscopic::none, Gyroscopic::explicit_step, Gyroscopic::implicit_step, Gyroscopic::momentum};
 
+/// The enumerator as text.
 const char* name(Gyroscopic gyroscopic);
 
 /// Law of restitution at impacts (method, section 7).
@@ -39,9 +41,11 @@ enum class RestitutionLaw : std::uint8_t {
   poisson
 };
 
+/// Both.
 inline constexpr std::array<RestitutionLaw, 2> kRestitutionLaws{RestitutionLaw::newton,
                                                                 RestitutionLaw::poisson};
 
+/// The enumerator as text.
 const char* name(RestitutionLaw law);
 
 /// Says what contacts that touch do in an impact of others of their island.
@@ -50,9 +54,11 @@ enum class SimultaneousImpacts : std::uint8_t {
   in_turn    ///< those that approach strike alone, then those that this makes approach, and so on
 };
 
+/// Both.
 inline constexpr std::array<SimultaneousImpacts, 2> kSimultaneousImpacts{
     SimultaneousImpacts::together, SimultaneousImpacts::in_turn};
 
+/// The enumerator as text.
 const char* name(SimultaneousImpacts impacts);
 
 /// Bodies as contiguous data; index i everywhere is body i. World axes but for `inertia`.
@@ -64,9 +70,10 @@ struct BodySet {
   std::vector<Eigen::Matrix3d> inertia;          ///< about the centre, body axes, kg m^2
   std::vector<Eigen::Matrix3d> inverse_inertia;  ///< body axes
 
+  /// Number of bodies.
   int size() const { return static_cast<int>(position.size()); }
-  /// Returns the index. Throws std::invalid_argument unless mass and inertia are positive
-  /// (definite) and all values finite.
+  /// Adds a body: kg, kg m^2, m, m/s, rad/s, as in the arrays above. Returns its index. Throws
+  /// std::invalid_argument unless mass and inertia are positive (definite) and all values finite.
   int add(double body_mass, const Eigen::Matrix3d& body_inertia, const Eigen::Vector3d& at,
           const linalg::Quaternion& turned = linalg::Quaternion::Identity(),
           const Eigen::Vector3d& velocity = Eigen::Vector3d::Zero(),
@@ -78,24 +85,26 @@ struct BodySet {
 
 /// A shape on a body, of a material.
 struct Surface {
-  int body = 0;
-  Shape shape;
-  int material = 0;
+  int body = 0;      ///< index in the BodySet
+  Shape shape;       ///< placed on the body
+  int material = 0;  ///< number that Meeting refers to
   /// The velocity of the surface against its body, m/s and rad/s about the centre of mass, in body
   /// axes: of a belt, a turntable. Friction acts against it.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< see velocity
+  /// Whether it moves against its body.
   bool moves_on_body() const { return !velocity.isZero(0) || !angular_velocity.isZero(0); }
 };
 
 /// How two materials meet. Materials that no Meeting names pass through each other.
 struct Meeting {
-  int first = 0, second = 0;
-  double friction = 0;
-  double restitution = 0;  ///< 0 .. 1
+  int first = 0, second = 0;  ///< materials, in any order
+  double friction = 0;        ///< coefficient, >= 0
+  double restitution = 0;     ///< 0 .. 1
   /// Moments that a contact holds, over its normal force: about axes in the surface and about the
   /// normal, m (method, section 8). Only with law = coulomb and restitution_law = newton.
   double rolling = 0, torsional = 0;
+  /// Whether contacts of these materials hold moments.
   bool rolls() const { return rolling > 0 || torsional > 0; }
 };
 
@@ -111,7 +120,7 @@ struct SteppingOptions {
   /// in one.
   double accuracy = 0;
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: not evaluated
-  Law law = Law::coulomb;
+  Law law = Law::coulomb;                  ///< of every contact
   /// BodyOptions::tolerance of the contact problems.
   double tolerance = 1e-9;
   /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
@@ -125,13 +134,13 @@ struct SteppingOptions {
   /// five times max_work where needed, and if acceptance > 1 up to 1e-3 then. A shortest part above
   /// that is used all the same and counted as `unsolved`. 0: no halving.
   int max_halvings = 0;
-  Gyroscopic gyroscopic = Gyroscopic::momentum;
+  Gyroscopic gyroscopic = Gyroscopic::momentum;  ///< of bodies that are no spheres
   /// A penetration of depth d is reduced at the speed min(error_reduction d / dt,
   /// max_depenetration_speed). This speed changes positions only: it is not part of the bodies'
   /// velocities and adds no energy. 0: penetrations stay.
   double error_reduction = 0.2;
-  double max_depenetration_speed = 1;  ///< m/s
-  RestitutionLaw restitution_law = RestitutionLaw::newton;
+  double max_depenetration_speed = 1;                       ///< m/s
+  RestitutionLaw restitution_law = RestitutionLaw::newton;  ///< laws of joints need `newton`
   /// Approaches slower than this times sqrt(g s) do not bounce: g is gravity (none: all bounce), s
   /// the largest distance of a point of the smaller shape from its origin. A drop from height h
   /// bounces if h > threshold^2 s / 2.
@@ -156,12 +165,12 @@ struct SteppingOptions {
   /// Points are contacts if their gap is below this part of the size of the smaller shape plus the
   /// distance that the velocities cover within the step.
   double near_part = 1e-3;
-  int min_sweeps = 8;     ///< see BodyOptions; remove slow creep of bodies at rest
-  int max_sweeps = 1000;  ///< see BodyOptions
-  int max_assembled = 1000;
+  int min_sweeps = 8;        ///< see BodyOptions; remove slow creep of bodies at rest
+  int max_sweeps = 1000;     ///< see BodyOptions
+  int max_assembled = 1000;  ///< see BodyOptions
   /// See BodyOptions: bounds the time of a step.
   double max_work = 2e8;
-  int threads = 1;
+  int threads = 1;  ///< results have the same bits for every number of threads
   /// Processes that take the same steps and share the work of their contact problems; see
   /// BodyOptions. Bits are those of one process.
   SolverTeam* team = nullptr;
@@ -188,7 +197,10 @@ constexpr std::uint64_t contact_id(int first_surface, int second_surface, int fe
 
 /// Work since the start.
 struct StepCounts {
-  long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0, bounces = 0;
+  /// Sub-steps that were repeated count each time in contact_problems, sweeps and
+  /// assembled_islands.
+  long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0;
+  long bounces = 0;   ///< contacts that got an impulse of restitution
   long accepted = 0;  ///< problems above the tolerance that were accepted
   long halved = 0;    ///< steps and sub-steps that were taken in two halves
   long parts = 0;     ///< with an accuracy: parts that steps were taken in
@@ -202,56 +214,59 @@ struct StepCounts {
 struct StepperMemory {
   /// The momentum of a body without torque, see rotation.hpp, and the state that it belongs to.
   struct Spin {
+    /// Angular momentum about the centre (kg m^2/s) and angular velocity (rad/s), world axes.
     Eigen::Vector3d momentum, angular_velocity;
     std::array<double, 4> orientation;  ///< x, y, z, w
   };
-  long steps = 0;
+  long steps = 0;                            ///< taken since the start
   WarmStart contacts, corrections, bounces;  ///< of the contact problems of a step
   std::vector<Spin> spins;                   ///< of bodies whose angular momentum is kept
   StepContacts last;                         ///< contacts of the last step; then its outcome:
-  double penetration = 0, residual = 0;
-  Status status = Status::solved;
-  /// With an accuracy: length of the next part, s (0: not chosen), length and error (1: the
-  /// accuracy) of the last one, length that the impulses are of.
+  double penetration = 0, residual = 0;      ///< Stepper::penetration(), residual()
+  Status status = Status::solved;            ///< Stepper::status()
+  /// State of the step-size controller, with an accuracy.
   struct Control {
-    double next = 0, last = 0, error = 0, length = 0;
-  } control;
-  double drift = 0;  ///< of the joints, m or rad
-  /// Fastest vibration of bodies across the forces of their joints: w, 1/s, and its velocities, of
-  /// all bodies; none: of no step yet. It goes with the root of the acceleration by joints, in the
-  /// norm of the kinetic energy, N^(1/2) m^(-1/2).
+    double next = 0;    ///< length of the next sub-step, s; 0: not chosen
+    double last = 0;    ///< length of the last one, s
+    double error = 0;   ///< its error; 1 is the accuracy
+    double length = 0;  ///< s, that the stored impulses are of
+  } control;            ///< all 0 without an accuracy
+  double drift = 0;     ///< of the joints, m or rad
+  /// Fastest vibration of bodies across the forces of their joints (method, section 7.1).
   struct Vibration {
-    double frequency = 0, acceleration = 0;
-    std::vector<Vector6d> mode;
-  } vibration;
+    double frequency = 0;        ///< 1/s; it goes with the root of `acceleration`
+    double acceleration = 0;     ///< by joints, in the norm of the kinetic energy, N^(1/2) m^(-1/2)
+    std::vector<Vector6d> mode;  ///< velocities of all bodies in it; empty: of no step yet
+  } vibration;                   ///< none without joints
   double cuts = 0;  ///< that may still be made where there are many contacts, in problems
-  /// State of a body where any may sleep: how long it has been slow, s; its island, -1: awake. Then
-  /// whether it fell asleep in this sub-step; accelerations by forces, as of now or of the sleep.
+  /// State of a body where any may sleep.
   struct Rest {
-    double slow = 0;
-    int island = -1;
-    bool fresh = false;
+    double slow = 0;     ///< how long it has been slow, s
+    int island = -1;     ///< -1: awake
+    bool fresh = false;  ///< it fell asleep in this sub-step
+    /// Accelerations by forces, now or when it fell asleep: m/s^2, rad/s^2, world axes.
     Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
-    Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();
+    Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< see acceleration
   };
   /// A body that a sleeping island lies on, as it was when the island fell asleep.
   struct Neighbour {
-    int body = 0, island = 0;
-    Eigen::Vector3d position;
-    linalg::Quaternion orientation;
-    Eigen::Vector3d velocity, angular_velocity;
+    int body = 0, island = 0;                    ///< its index, and the island on it
+    Eigen::Vector3d position;                    ///< m
+    linalg::Quaternion orientation;              ///< unit; body to world
+    Eigen::Vector3d velocity, angular_velocity;  ///< m/s, rad/s, world axes
   };
+  /// Who sleeps, and on what.
   struct Sleep {
-    std::vector<Rest> bodies;  ///< empty: none may sleep
-    StepContacts contacts;     ///< of those asleep, with forces in the place of impulses
-    std::vector<Neighbour> neighbours;
-  } sleep;
+    std::vector<Rest> bodies;           ///< empty: none may sleep
+    StepContacts contacts;              ///< of those asleep, with forces in the place of impulses
+    std::vector<Neighbour> neighbours;  ///< of all sleeping islands
+  } sleep;                              ///< empty with SteppingOptions::sleep = 0
 };
 
 /// Time spent on one effect since the start, s.
 struct StageCost {
-  const char* effect;
-  double seconds;
+  const char* effect;  ///< "gravity", "contact", ...
+  double seconds;      ///< wall time
 };
 
 /// Advances a set of bodies by steps of fixed length (method, section 7):
@@ -289,9 +304,9 @@ class Stepper {
   void step();
 
   double time() const;  ///< steps * dt; where a start was late, that until its step is taken
-  const BodySet& bodies() const;
-  BodySet& bodies();  ///< to set positions and velocities between steps
-  const StepContacts& contacts() const;
+  const BodySet& bodies() const;         ///< at time()
+  BodySet& bodies();                     ///< to set positions and velocities between steps
+  const StepContacts& contacts() const;  ///< of the last step
   /// Moments of impulse on `first` that rolling and torsional friction add, of contacts(): world
   /// axes, N m s. Empty unless a meeting names either.
   const std::vector<Eigen::Vector3d>& contact_moments() const;
@@ -315,14 +330,15 @@ class Stepper {
   /// Length, s, of the last part of the last step, which impulses are of: forces are impulses over
   /// it. 0 before the first step, and after set_memory().
   double last_part() const;
-  int asleep() const;  ///< bodies that sleep
-  const StepCounts& counts() const;
-  std::vector<StageCost> costs() const;
-  const SteppingOptions& options() const;
+  int asleep() const;                      ///< bodies that sleep
+  const StepCounts& counts() const;        ///< since the start
+  std::vector<StageCost> costs() const;    ///< since the start, one for each effect
+  const SteppingOptions& options() const;  ///< those given at the start
 
-  /// Continue the motion of another Stepper bit by bit; the caller copies bodies() as well.
-  /// set_memory() throws std::invalid_argument if the memory belongs to other bodies.
+  /// The state beside bodies(), which the caller copies as well.
   StepperMemory memory() const;
+  /// Continues the motion of another Stepper bit by bit. Throws std::invalid_argument if the memory
+  /// belongs to other bodies.
   void set_memory(const StepperMemory& memory);
   /// Drops all warm starts and sets the number of steps. The next step begins `late` after its
   /// boundary, in 0 <= late < dt, s, and ends at its own: bodies() are those of that time.
@@ -333,9 +349,9 @@ class Stepper {
   std::unique_ptr<Implementation> implementation_;
 };
 
-double kinetic_energy(const BodySet& bodies);
-Eigen::Vector3d momentum(const BodySet& bodies);
-Eigen::Vector3d angular_momentum(const BodySet& bodies);  ///< about the origin
+double kinetic_energy(const BodySet& bodies);             ///< J
+Eigen::Vector3d momentum(const BodySet& bodies);          ///< kg m/s, world axes
+Eigen::Vector3d angular_momentum(const BodySet& bodies);  ///< about the origin, kg m^2/s
 
 }  // namespace tether::contact
 TETHER_EXPORT_END

@@ -29,8 +29,9 @@ template <class... Arguments>
 class Callable {
  public:
   Callable() = default;
-  Callable(std::nullptr_t) {}
+  Callable(std::nullptr_t) {}  ///< empty, as by default
 
+  /// From anything that can be called with these arguments.
   template <class F, class = std::enable_if_t<!std::is_same_v<std::decay_t<F>, Callable> &&
                                               std::is_invocable_v<std::decay_t<F>&, Arguments...>>>
   Callable(F&& f) {
@@ -43,7 +44,9 @@ class Callable {
       call_ = std::forward<F>(f);
   }
 
+  /// Whether it holds a function.
   explicit operator bool() const { return static_cast<bool>(call_); }
+  /// The int that the function returns, 0 where it returns nothing.
   int operator()(Arguments... arguments) const {
     return call_(std::forward<Arguments>(arguments)...);
   }
@@ -58,15 +61,17 @@ struct FiniteDifferences {};
 
 /// C written by the caller. C is zero on entry, so only the non-zero entries need be set.
 struct DenseJacobian {
-  Callable<double, ConstVector, Matrix> fill;
+  Callable<double, ConstVector, Matrix> fill;  ///< (t, y, C): writes C = dg/dy at (t, y)
   /// Optional: g as Constraints::value writes it and C as `fill` does, in one call, for rows whose
   /// value and gradient share work (angles, energies). Used wherever both are needed at one point;
   /// the other two are needed still, for g alone and C alone.
   Callable<double, ConstVector, Vector, Matrix> fill_with_value;
 
   DenseJacobian() = default;
+  /// From `fill`.
   template <class F, class = std::enable_if_t<!std::is_same_v<std::decay_t<F>, DenseJacobian>>>
   DenseJacobian(F&& f) : fill(std::forward<F>(f)) {}
+  /// From `fill` and `fill_with_value`.
   template <class F, class Both>
   DenseJacobian(F&& f, Both&& both)
       : fill(std::forward<F>(f)), fill_with_value(std::forward<Both>(both)) {}
@@ -80,9 +85,9 @@ struct DenseJacobian {
 /// N <= 65536, take the factors of dense rows: the run is that of the same rows as a DenseJacobian,
 /// bit for bit. More rows take sparse factors, and agree with dense ones to the tolerance.
 struct SparseJacobian {
-  std::vector<int> starts;   ///< count + 1, from 0 to the number of entries
-  std::vector<int> columns;  ///< of each entry
-  Callable<double, ConstVector, Vector> fill;
+  std::vector<int> starts;                     ///< count + 1, from 0 to the number of entries
+  std::vector<int> columns;                    ///< of each entry
+  Callable<double, ConstVector, Vector> fill;  ///< (t, y, entries)
   /// Optional: g and the entries in one call, as DenseJacobian::fill_with_value.
   Callable<double, ConstVector, Vector, Vector> fill_with_value;
 };
@@ -91,8 +96,8 @@ struct SparseJacobian {
 /// N_Vectors only. `value` fills g[0..m-1] with the same numbers on every process; `fill` writes
 /// the m gradients dg_i/dy, each an N_Vector like y. Replaces Constraints::value.
 struct Gradients {
-  Callable<double, N_Vector, double*> value;
-  Callable<double, N_Vector, N_Vector*> fill;
+  Callable<double, N_Vector, double*> value;   ///< (t, y, g)
+  Callable<double, N_Vector, N_Vector*> fill;  ///< (t, y, gradients)
 };
 
 /// Many rows with few entries each on vectors that are spread over processes: a net of rods on MPI
@@ -121,10 +126,11 @@ struct DistributedRows {
 /// weights. err holds a copy of the corrector's accumulated correction. IDA uses the projected
 /// correction for its error test, so whatever is written to err is ignored.
 struct UserProjection {
+  /// 0 success, > 0 recoverable, < 0 fatal.
   using Function = int (*)(sunrealtype t, N_Vector y, N_Vector corr, sunrealtype eps_proj,
                            N_Vector err, void* user_data);
-  Function function = nullptr;
-  void* user_data = nullptr;
+  Function function = nullptr;  ///< must be set
+  void* user_data = nullptr;    ///< its last argument
 };
 
 /// The set { y : g(t, y) = 0 } on which the solution is kept, m rows, g in the caller's own units.
@@ -158,7 +164,7 @@ Constraints operator+(Constraints a, const Constraints& b);
 
 /// The result of check_jacobian.
 struct JacobianReport {
-  bool correct = true;
+  bool correct = true;    ///< no entry is wrong
   double worst = 0.0;     ///< largest relative difference |C - C_difference| / (column scale)
   int row = -1;           ///< of the worst entry; -1 when C is correct
   int column = -1;        ///< of the worst entry; -1 when C is correct, or for a value
@@ -176,6 +182,7 @@ struct JacobianReport {
 /// the larger of its own size and its row's largest entry, both in the scale max(|y_j|, 1).
 JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVector y,
                               double tolerance = 1e-5);
+/// The same for y in a std::vector.
 JacobianReport check_jacobian(const Constraints& constraints, double t,
                               const std::vector<double>& y, double tolerance = 1e-5);
 

@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+/// The projection in deal.II's SUNDIALS::IDA.
 namespace tether::ida_projection::deal_ii {
 
 /// The set { y : g(t, y) = 0 }, few rows (mass, energy, momenta), as functions of deal.II's

@@ -54,7 +54,7 @@ struct Progress {
 /// Settings that few programs need. "Tolerances" are units of the error test: the WRMS norm
 /// sqrt(sum (dy_i / WT_i)^2 / N) with WT_i = rtol |y_i| + atol_i, in which IDA accepts about 1.
 struct Advanced {
-  Metric metric = Metric::automatic;
+  Metric metric = Metric::automatic;  ///< in which the move is shortest
 
   /// Estimated distance left to the constraints is at most this many tolerances; > 0.
   double tolerance = 1e-4;
@@ -65,7 +65,7 @@ struct Advanced {
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
   /// tolerances; >= 0.1.
   double largest_move = 10.0;
-  LongMove long_move = LongMove::reject;
+  LongMove long_move = LongMove::reject;  ///< what becomes of a longer one
 
   /// One F and one back substitution with IDA's own factors; skipped in steps where IDA itself made
   /// two iterations, unless there are algebraic variables and the move was longer than a tenth of a
@@ -77,10 +77,9 @@ struct Advanced {
   /// tested once, in serial vectors; above 200 unknowns by equations of F that contain neither y'
   /// nor algebraic variables. IDASetMaxStep is not used then.
   bool smooth_where_needed = true;
-  /// Limits for step_smoothing, which owns IDASetMaxStep: the longest step (0: none), and
-  /// IDASetMaxOrd's order, if it was called.
+  /// The longest step for step_smoothing, which owns IDASetMaxStep; 0: none.
   double maximum_step = 0.0;
-  int maximum_order = 5;
+  int maximum_order = 5;  ///< the order given to IDASetMaxOrd, for step_smoothing
 
   /// Limit the order to 2 where higher orders excite fast oscillations that would otherwise stay
   /// below the tolerance, as recognised from the differences of y (docs/method/projection.md,
@@ -137,7 +136,7 @@ struct Options {
   /// Called after every accepted step; must not throw.
   std::function<void(const Progress&)> progress;
 
-  Advanced advanced;
+  Advanced advanced;  ///< settings that few programs need
 };
 
 }  // namespace tether::ida_projection

@@ -20,62 +20,65 @@ struct Sensitivities;  // <tether/ida_projection/sensitivities.hpp>
 
 /// Outcome of the last action of the plugin. Negative values end the run.
 enum class Status {
-  unused = 0,  ///< attached, IDA has not called yet
-  success,
-  not_converged,  ///< moves did not shrink, or too many of them
-  move_too_long,
-  inconsistent,  ///< rows contradict each other; message names them
-  not_finite,    ///< NaN or infinity in g, C or y
-  callback_recoverable,
-  corrector_failed,  ///< the decorated solver failed; nothing was projected
-  collapsed,         ///< the last step was projected, but IDA rejects most steps; message tells why
-  doubtful,  ///< the last step was projected, but F does not keep a row, C is wrong, or atol lies
-             ///< above the solution; message tells which
-  callback_fatal = -1,
+  unused = 0,            ///< attached, IDA has not called yet
+  success,               ///< the point lies on the constraints
+  not_converged,         ///< moves did not shrink, or too many of them
+  move_too_long,         ///< longer than Advanced::largest_move allows
+  inconsistent,          ///< rows contradict each other; message names them
+  not_finite,            ///< NaN or infinity in g, C or y
+  callback_recoverable,  ///< a callback returned > 0
+  corrector_failed,      ///< the decorated solver failed; nothing was projected
+  collapsed,  ///< the last step was projected, but IDA rejects most steps; message tells why
+  doubtful,   ///< the last step was projected, but F does not keep a row, C is wrong, or atol lies
+              ///< above the solution; message tells which
+  callback_fatal = -1,              ///< a callback returned < 0 or threw
   late_attach = -2,                 ///< attached after IDA was initialised: call IDAReInit
   simultaneous_sensitivities = -3,  ///< IDA_SIMULTANEOUS bypasses the plugin: use IDA_STAGGERED
-  never_called = -4,  ///< IDA took steps without the plugin: another solver was attached later
-  internal_error = -5,
-  out_of_memory = -6,  ///< memory ran out inside IDA's call; IDAReInit starts anew
-  misused = -7,        ///< a call that cannot be answered, which changed nothing; message tells why
+  never_called = -4,    ///< IDA took steps without the plugin: another solver was attached later
+  internal_error = -5,  ///< the library cannot go on; message tells why
+  out_of_memory = -6,   ///< memory ran out inside IDA's call; IDAReInit starts anew
+  misused = -7,  ///< a call that cannot be answered, which changed nothing; message tells why
 };
 
+/// The enumerator as text.
 const char* to_string(Status status);
 
 /// How far make_consistent or project moved things.
 struct ConsistencyReport {
-  Status status = Status::unused;
-  std::string message;
+  Status status = Status::unused;  ///< of the call
+  std::string message;             ///< what to do about it; empty when all is well
   int iterations = 0;              ///< Gauss-Newton steps of the projection of y
   double move = 0.0;               ///< length of the change of y, in tolerances (WRMS)
   double largest_change = 0.0;     ///< largest |change| of a component of y
   int changed_component = -1;      ///< which one (serial vectors)
   double derivative_change = 0.0;  ///< largest |change| of a component of y'
   double drift_before = 0.0;       ///< largest |g_i|
-  double drift_after = 0.0;
-  double residual_before = -1.0;  ///< largest |F_i| at the given values; -1 when not known
-  double residual_after = -1.0;   ///< largest |F_i| after; -1 when not known
-  int rank = 0;                   ///< of C at the end
-  bool slow_convergence = false;  ///< gradients vanish on the set: |g| says little about distance
-  std::vector<int> contradicting_rows;
+  double drift_after = 0.0;        ///< largest |g_i|
+  double residual_before = -1.0;   ///< largest |F_i| at the given values; -1 when not known
+  double residual_after = -1.0;    ///< largest |F_i| after; -1 when not known
+  int rank = 0;                    ///< of C at the end
+  bool slow_convergence = false;   ///< gradients vanish on the set: |g| says little about distance
+  std::vector<int> contradicting_rows;  ///< rows of g that no point near obeys together
 
+  /// Whether it succeeded.
   explicit operator bool() const { return status == Status::success; }
 };
 
 /// How make_consistent finds y'.
 struct Consistency {
+  /// The method for y'.
   enum class Derivative {
     automatic,      ///< IDACalcIC; if that fails and `residual` is given, least squares
     calc_ic,        ///< IDACalcIC (IDA_YA_YDP_INIT) with the id vector
     least_squares,  ///< Gauss-Newton on (y' differential, y algebraic), serial vectors
     keep,           ///< leave y' as it is
   };
-  Derivative derivative = Derivative::automatic;
-  double direction =
-      0.0;  ///< time of a first output, as IDACalcIC wants; 0 = t0 + 1e-3 max(1,|t0|)
+  Derivative derivative = Derivative::automatic;  ///< the method for y'
+  /// Time of a first output, as IDACalcIC wants; 0 = t0 + 1e-3 max(1, |t0|).
+  double direction = 0.0;
   IDAResFn residual = nullptr;  ///< F, for least squares and for the residuals in the report
-  void* user_data = nullptr;
-  int maximum_iterations = 30;
+  void* user_data = nullptr;    ///< of `residual`
+  int maximum_iterations = 30;  ///< of least squares
   std::vector<bool> hold;  ///< components of y to leave as they are (in addition to Options::hold)
 };
 
@@ -139,11 +142,11 @@ class [[nodiscard]] Projection {
   /// sensitivities; std::invalid_argument for a UserProjection.
   ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
 
-  Statistics statistics() const;  ///< since the start, or the last reset
-  void reset_statistics();
-  Status status() const;               ///< of the last call by IDA, or of the last call above
-  const std::string& message() const;  ///< what to do about it; empty when all is well
-  const Constraints& constraints() const;
+  Statistics statistics() const;           ///< since the start, or the last reset
+  void reset_statistics();                 ///< all to 0
+  Status status() const;                   ///< of the last call by IDA, or of the last call above
+  const std::string& message() const;      ///< what to do about it; empty when all is well
+  const Constraints& constraints() const;  ///< those attached
 
   class TETHER_HIDDEN Impl;  // the decorator; see src/
 

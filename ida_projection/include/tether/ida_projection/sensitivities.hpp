@@ -16,9 +16,10 @@ namespace tether::ida_projection {
 struct Sensitivities {
   int count = 0;  ///< Ns of IDASensInit
 
-  /// dg/dp_k at (t, y) for parameter k = 0 .. count - 1, m values in g's units per unit of p_k;
-  /// zero on entry. For rows that are Gradients: `vector_derivative`, the same on every process.
+  /// (t, y, k, g_p): dg/dp_k at (t, y) for parameter k = 0 .. count - 1, m values in g's units per
+  /// unit of p_k; zero on entry.
   Callable<double, ConstVector, int, Vector> derivative;
+  /// The same for rows that are Gradients, with the same numbers on every process.
   Callable<double, N_Vector, int, double*> vector_derivative;
 
   /// The host's p, which g reads, as in IDASetSensParams: each p_k is changed by up to 2e-3 of its

@@ -18,11 +18,11 @@ struct Statistics {
   long value_evaluations = 0;     ///< g
   long jacobian_evaluations = 0;  ///< C, however formed
   long joint_evaluations = 0;     ///< of both: g and C by one call, where rows have such a function
-  long factorizations = 0;
-  long refactorizations = 0;  ///< of the rows that an earlier one has kept
-  long extra_iterations = 0;  ///< corrector iterations added
+  long factorizations = 0;        ///< of C in the metric, with a decision on its rank
+  long refactorizations = 0;      ///< of the rows that an earlier one has kept
+  long extra_iterations = 0;      ///< corrector iterations added
   long corrections_repeated =
-      0;               ///< corrections redone with fresh factors: the old ones misled IDA
+      0;               ///< corrections redone with a new Jacobian: the stale one misled IDA
   long refreshes = 0;  ///< refreshes of the algebraic variables
   long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
   long rank_drops = 0;            ///< factorisations that dropped redundant rows
@@ -47,19 +47,20 @@ struct Statistics {
   double mean_move = 0.0;             ///< in tolerances (WRMS)
   double seconds = 0.0;  ///< wall time in the projection; measured on every 16th and scaled up
 
+  /// All of them but capped moves and corrector failures.
   long failures() const {
     return not_converged + move_too_long + inconsistent + not_finite + callback_recoverable +
            callback_fatal;
   }
   /// A verdict of one line, then two columns: each quantity that is not zero.
   std::string table() const;
-  /// Names of all quantities, and their values, separated by commas.
-  static std::string csv_header();
-  std::string csv_row() const;
+  static std::string csv_header();  ///< names of all quantities, separated by commas
+  std::string csv_row() const;      ///< their values, in the same order
   /// The number in that column of csv_header(); NaN if there is none.
   double number(const std::string& column) const;
 };
 
+/// Writes table().
 std::ostream& operator<<(std::ostream& out, const Statistics& statistics);
 
 }  // namespace tether::ida_projection

@@ -28,11 +28,12 @@ extern "C" {
 #pragma GCC visibility push(default)
 #endif
 
+/** A version of SUNDIALS. */
 typedef struct {
-  int major, minor, patch, index_bits;
+  int major, minor, patch, index_bits; /**< index_bits: 32 or 64 */
 } tether_sundials_build;
 
-/* The SUNDIALS whose headers the library was compiled with. The header of its host spells the name
+/** The SUNDIALS whose headers the library was compiled with. The header of its host spells the name
  * with what the host sees; the layouts of SUNDIALS' structures change with all three parts, and a
  * host that sees others does not link: "undefined reference to
  * tether_built_for_sundials_7_double_index64" means that the library is for another SUNDIALS. */

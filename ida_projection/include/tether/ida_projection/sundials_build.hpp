@@ -9,6 +9,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
+/// A version of SUNDIALS: major, minor, patch, and bits of its indices.
 using SundialsBuild = ::tether_sundials_build;
 
 /// Throws std::runtime_error unless the SUNDIALS in this process has the major version of `built`

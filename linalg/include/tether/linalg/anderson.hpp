@@ -13,14 +13,17 @@ namespace tether::linalg {
 /// `depth` differences. The Gram matrix is kept, so that a step costs 2 depth dots and depth axpys.
 class Anderson {
  public:
-  static constexpr int kMaxDepth = 20;
+  static constexpr int kMaxDepth = 20;  ///< largest depth
 
+  /// For x of `size` vectors of three and the last `depth` differences, 1 to kMaxDepth. Allocates;
+  /// forgets the differences.
   void reset(int size, int depth);
+  /// Forgets the differences; keeps the storage.
   void clear() {
     count_ = 0;
     primed_ = false;
   }
-  /// x <- accelerated point (g on the first call after clear()).
+  /// x <- accelerated point (g on the first call after clear()). All have reset()'s size.
   void step(const PackedVector* g, const PackedVector* f, PackedVector* x);
 
  private:

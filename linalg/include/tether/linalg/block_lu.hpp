@@ -8,11 +8,12 @@
 TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
-/// A diagonal block D as P D = L U: unit lower triangle, upper triangle with the reciprocals of its
-/// diagonal, row k of P D is row order[k] of D.
+/// A 3x3 diagonal block D as P D = L U.
 struct BlockPivot {
-  double l10, l20, l21, u01, u02, u12, reciprocal[3];
-  int order[3];
+  double l10, l20, l21;  ///< below the unit diagonal of L
+  double u01, u02, u12;  ///< above the diagonal of U
+  double reciprocal[3];  ///< 1 / U_kk
+  int order[3];          ///< row k of P D is row order[k] of D
 };
 
 /// L U of 3x3 blocks: unsymmetric values on a symmetric pattern. Pivots are the diagonal blocks in
@@ -20,17 +21,19 @@ struct BlockPivot {
 /// each set of active rows. Then every row: begin_row, add for each of its blocks, end_row.
 class BlockLu {
  public:
+  /// Chooses the elimination order of a pattern. Allocates.
   void order(const BlockPattern& pattern);
   /// Rows and columns with active != 0 (null: all). Does nothing if the set is the last one.
   void analyse(const BlockPattern& pattern, const char* active);
   double operations() const { return operations_; }  ///< sum of |S_k|^2 over the pivots
 
-  int size() const { return n_; }
+  int size() const { return n_; }                               ///< active block rows
   int block_row(int row) const { return block_row_[at(row)]; }  ///< elimination order -> block row
   int position(int block_row) const { return position_[at(block_row)]; }  ///< -1: not active
 
   /// Rows one after the other, in elimination order; `block` has 3 columns of 4.
   void begin_row(int row) { row_ = row; }
+  /// Adds a block to the row begun, in an active block column.
   void add(int block_column, const double* block);
   bool end_row();  ///< eliminates; false: singular pivot
 

@@ -9,10 +9,13 @@ namespace tether::linalg {
 
 // Points x of the cone |x_t| <= x_n have four entries, x_n, x_t and the gap x_n - |x_t|: close to
 // the cone the difference of the first three has lost its digits.
+
+/// |x_t|.
 inline double tangent(const double* x) { return std::sqrt(x[1] * x[1] + x[2] * x[2]); }
+/// x_n^2 - |x_t|^2, from the gap.
 inline double determinant(const double* x) { return x[3] * (x[3] + 2 * tangent(x)); }
 
-// x.u >= 0 for two points of the cone, without cancellation where they are nearly orthogonal.
+/// x.u >= 0 for two points of the cone, without cancellation where they are nearly orthogonal.
 inline double product(const double* x, const double* u) {
   const double tx = tangent(x), tu = tangent(u), along = x[1] * u[1] + x[2] * u[2];
   double rest = tx * tu + along;
@@ -23,7 +26,8 @@ inline double product(const double* x, const double* u) {
   return x[3] * u[0] + tx * u[3] + rest;
 }
 
-// Largest t with x + t d in the cone; determinant = x_n^2 - |x_t|^2.
+/// Largest t with x + t d in the cone, which may be infinite; determinant = x_n^2 - |x_t|^2. d has
+/// three entries.
 inline double longest(const double* x, double determinant, const double* d) {
   // det(x + t d) = a t^2 + 2 b t + c
   const double a = d[0] * d[0] - d[1] * d[1] - d[2] * d[2];
@@ -44,22 +48,24 @@ inline double longest(const double* x, double determinant, const double* d) {
   return t;
 }
 
-// Scaling by Nesterov and Todd, W x = W^-1 u = lambda. W is symmetric and diagonal in the frame Q:
-// with t the direction of omega_t, W^2 = theta (2 omega omega' - J), J = diag(1, -1, -1), the
-// eigenvectors are (1, t), (1, -t), both over sqrt(2), and the tangent across t.
+/// Scaling by Nesterov and Todd (Math. Oper. Res. 22, 1997, 1), W x = W^-1 u = lambda. W is
+/// symmetric and diagonal in the frame Q, and W^2 = theta (2 omega omega' - J), J = diag(1, -1,
+/// -1). With t the direction of omega_t, its eigenvectors are (1, t), (1, -t), both over sqrt(2),
+/// and the tangent across t.
 struct ConeScaling {
-  double Q[9];  // rows: eigenvectors
-  double d[3];  // eigenvalues of W
-  double lambda[3], lambda_det;
+  double Q[9];        ///< rows: eigenvectors
+  double d[3];        ///< eigenvalues of W
+  double lambda[3];   ///< the scaled point, in the axes of x
+  double lambda_det;  ///< its determinant(), the product of the roots of those of x and u
 
-  // A single positive number in place of the cone. false: one of both is not.
+  /// A single positive number in place of the cone. False: one of both is not.
   bool set_flat(double x, double u) {
     if (!(x > 0 && u > 0)) return false;
     *this = {
         {1, 0, 0, 0, 1, 0, 0, 0, 1}, {std::sqrt(u / x), 1, 1}, {std::sqrt(x * u), 0, 0}, x * u};
     return true;
   }
-  // false: x or u is not inside of the cone.
+  /// For points x and u of four entries. False: one is not inside of the cone.
   bool set(const double* x, const double* u) {
     const double square_x = determinant(x), square_u = determinant(u);
     if (!(square_x > 0 && square_u > 0)) return false;
@@ -82,10 +88,11 @@ struct ConeScaling {
       lambda[c] = q * ((half + u[0] / du) * x[c] / dx + (half + x[0] / dx) * u[c] / du);
     return true;
   }
-  // Into the frame and back.
+  /// y = Q x, into the frame.
   void turn(const double* x, double* y) const {
     for (int r = 0; r < 3; ++r) y[r] = Q[3 * r] * x[0] + Q[3 * r + 1] * x[1] + Q[3 * r + 2] * x[2];
   }
+  /// x = Q' y, back.
   void turn_back(const double* y, double* x) const {
     for (int c = 0; c < 3; ++c) x[c] = Q[c] * y[0] + Q[3 + c] * y[1] + Q[6 + c] * y[2];
   }

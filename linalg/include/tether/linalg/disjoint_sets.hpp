@@ -13,6 +13,7 @@ namespace tether::linalg {
 /// order in which sets are joined.
 class DisjointSets {
  public:
+  /// n sets of one index each.
   explicit DisjointSets(int n = 0) { reset(n); }
 
   /// Each of n indices is a set of its own. Allocates only where n grows.
@@ -20,11 +21,12 @@ class DisjointSets {
     parent_.resize(at(n));
     std::iota(parent_.begin(), parent_.end(), 0);
   }
+  /// The least index of the set of i; O(log n) amortised.
   int root(int i) {
     while (parent_[at(i)] != i) i = parent_[at(i)] = parent_[at(parent_[at(i)])];
     return i;
   }
-  /// False: they are in one set already.
+  /// Unites the sets of i and j. False: they are one already.
   bool join(int i, int j) {
     const int a = root(i), b = root(j);
     parent_[at(std::max(a, b))] = std::min(a, b);

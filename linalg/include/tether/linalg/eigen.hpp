@@ -18,13 +18,17 @@ namespace tether::linalg {
 /// unaligned loads are. Eigen::Vector3d (24 bytes) and Matrix3d (72) are never aligned.
 template <int Rows, int Columns>
 using Matrix = Eigen::Matrix<double, Rows, Columns, Eigen::ColMajor | Eigen::DontAlign>;
+/// A matrix of any size.
 using MatrixX = Matrix<Eigen::Dynamic, Eigen::Dynamic>;
+/// A column of any length.
 using VectorX = Matrix<Eigen::Dynamic, 1>;
+/// x, y, z, w in memory.
 using Quaternion = Eigen::Quaternion<double, Eigen::DontAlign>;
 
 /// Arguments: any Eigen vector or matrix of doubles. An expression is evaluated by the caller; what
 /// already lies in memory with contiguous columns is not copied.
 using VectorView = Eigen::Ref<const VectorX>;
+/// The same for matrices.
 using MatrixView = Eigen::Ref<const MatrixX, 0, Eigen::OuterStride<>>;
 
 static_assert(sizeof(Eigen::Index) == sizeof(std::ptrdiff_t),

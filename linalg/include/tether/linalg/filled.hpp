@@ -50,8 +50,9 @@ class FilledPlaces {
   }
   /// The known places of row i, ascending.
   const int* begin(int i) const { return places_.data() + static_cast<std::ptrdiff_t>(i) * n_; }
+  /// Behind the last of them.
   const int* end(int i) const { return begin(i) + counts_[static_cast<std::size_t>(i)]; }
-  /// Grows with the places.
+  /// Number of all known places; it never shrinks between calls of resize().
   long known() const { return known_; }
 
  private:

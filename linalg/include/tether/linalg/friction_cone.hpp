@@ -7,7 +7,7 @@
 
 namespace tether::linalg {
 
-// |x_t| <= mu x_n, the nearest point (Euclid).
+/// v <- its nearest point (Euclid) of the cone |v_t| <= mu v_n, mu >= 0; three entries.
 TETHER_INLINE void project_cone(double mu, double* v) {
   const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
   if (t <= mu * v[0]) return;
@@ -21,7 +21,7 @@ TETHER_INLINE void project_cone(double mu, double* v) {
   v[2] *= f;
 }
 
-// Radially: keeps x_n.
+/// v <- the point of the cone with the same v_n > 0 and direction of v_t; 0 for v_n <= 0.
 TETHER_INLINE void clip_cone(double mu, double* v) {
   if (!(v[0] > 0)) {
     v[0] = v[1] = v[2] = 0;
@@ -34,7 +34,8 @@ TETHER_INLINE void clip_cone(double mu, double* v) {
   v[2] *= f;
 }
 
-// s >= 0 with s = |w_t + s gamma|, the slip variable of the law; 0 for e >= 1 without such s.
+/// The slip variable of a law: s >= 0 with s = |w_t + s gamma|. Where there is none (|gamma| >= 1),
+/// |w_t|. Coulomb's law has gamma = 0.
 TETHER_INLINE double slip(double w0, double w1, double g0, double g1) {
   const double ww = w0 * w0 + w1 * w1, gg = g0 * g0 + g1 * g1;
   if (gg == 0) return std::sqrt(ww);
@@ -48,7 +49,8 @@ TETHER_INLINE double slip(double w0, double w1, double g0, double g1) {
   return std::sqrt(ww);
 }
 
-// P_K(x - w - (mu s, s gamma)), s the slip variable.
+/// v <- P_K(x - w - (mu s, s gamma)), s = slip(w_t, gamma): x solves the law where v = x (method,
+/// section 3). Three entries each.
 TETHER_INLINE void cone_natural_point(double mu, double g0, double g1, const double* x,
                                       const double* w, double* v) {
   const double s = slip(w[1], w[2], g0, g1);

@@ -6,7 +6,7 @@
 
 namespace tether::linalg {
 
-/// `index` >= 0.
+/// `index` as containers take it; it must not be negative.
 constexpr std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 }  // namespace tether::linalg

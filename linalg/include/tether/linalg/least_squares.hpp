@@ -23,7 +23,7 @@ class LeastSquares {
   /// A: rows x columns. May be called again, with another shape.
   void factor(MatrixView A);
   int rank() const;  ///< after factor()
-  /// After factor(). Lengths are those of A, which is not checked.
+  // After factor(). Lengths are those of A, which is not checked.
   VectorX solve(VectorView b) const;             ///< b: rows; x: columns
   MatrixX solve_columns(MatrixView B) const;     ///< B: rows x any number
   VectorX solve_transposed(VectorView c) const;  ///< of A' y = c; c: columns, y: rows

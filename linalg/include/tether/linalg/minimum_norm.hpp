@@ -34,11 +34,11 @@ struct Gathered;
 /// solve() do not.
 class MinimumNorm {
  public:
-  static constexpr int kSmallRows = 16;
-  static constexpr int kSmallColumns = 32;
+  static constexpr int kSmallRows = 16;     ///< most rows of the loops of fixed length
+  static constexpr int kSmallColumns = 32;  ///< and most columns
 
-  MinimumNorm();
-  MinimumNorm(int rows, int columns);
+  MinimumNorm();                       ///< 0 x 0
+  MinimumNorm(int rows, int columns);  ///< resize(rows, columns)
   ~MinimumNorm();
   MinimumNorm(MinimumNorm&&) noexcept;
   MinimumNorm& operator=(MinimumNorm&&) noexcept;
@@ -46,8 +46,8 @@ class MinimumNorm {
   /// Sets m and n. The only member that allocates.
   void resize(int rows, int columns);
 
-  int rows() const { return m_; }
-  int columns() const { return n_; }
+  int rows() const { return m_; }     ///< m
+  int columns() const { return n_; }  ///< n
 
   /// Writable storage for C, row i at row(i)[0 .. n-1]; factor() overwrites it.
   double* row(int i);
@@ -84,8 +84,8 @@ class MinimumNorm {
     if (kernel_ == nullptr) limit_rank();
   }
 
-  int rank() const { return rank_; }
-  int dropped() const { return m_ - rank_; }
+  int rank() const { return rank_; }          ///< rows that take part in solve()
+  int dropped() const { return m_ - rank_; }  ///< rows that do not
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const;
   /// |R_kk|, k < rank(): how much of a unit row is independent of those before it. From factor() no

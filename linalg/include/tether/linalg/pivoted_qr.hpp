@@ -21,7 +21,7 @@ class PivotedQr {
 
   /// A: rows x columns. May be called again, with another shape.
   void factor(MatrixView A);
-  int rank() const;  ///< this and what follows: after factor()
+  int rank() const;  ///< pivots that count; this and all below: after factor()
   /// Upper triangle: R, columns in the order of the pivots; below it lie the reflections of Q.
   MatrixView R() const;
   std::vector<int> order() const;  ///< columns of A, the first pivot's first

@@ -14,7 +14,7 @@ namespace tether::linalg {
 /// and denseGETRS do, so that factors and solutions have their bits.
 class SmallLU {
  public:
-  static constexpr int kLargest = 64;
+  static constexpr int kLargest = 64;  ///< most rows
 
   /// `a`: n columns of n entries each, replaced by U and, below the diagonal, L without its ones.
   /// Returns 0, or k + 1 where every candidate for the k-th pivot is 0; then only k columns are
@@ -24,7 +24,7 @@ class SmallLU {
   /// A x = b with the factors that the last factor() left in `a`. x may be b.
   void solve(const double* a, const double* b, double* x) const { solve_(*this, a, b, x); }
 
-  int size() const { return n_; }
+  int size() const { return n_; }  ///< rows of the last factor()
   /// Row of A that became row k of P A.
   int row(int k) const { return row_[k]; }
 

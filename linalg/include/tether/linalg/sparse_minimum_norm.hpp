@@ -33,19 +33,20 @@ namespace tether::linalg {
 /// share makes that m^2. factor() and solve() do not allocate.
 class SparseMinimumNorm {
  public:
-  static constexpr double kTolerance = 1e-14;
+  static constexpr double kTolerance = 1e-14;  ///< of solve(), relative to |b|
 
   SparseMinimumNorm();
   ~SparseMinimumNorm();
   SparseMinimumNorm(SparseMinimumNorm&&) noexcept;
   SparseMinimumNorm& operator=(SparseMinimumNorm&&) noexcept;
 
-  /// Sparse rows in compressed form: columns[starts[i] .. starts[i + 1]), ascending, of row i.
+  /// Sets the pattern. Sparse rows in compressed form: columns[starts[i] .. starts[i + 1]),
+  /// ascending, of row i.
   void resize(int columns, std::vector<int> starts, std::vector<int> column_of, int full_rows);
 
-  int rows() const;
-  int columns() const;
-  int sparse_rows() const;
+  int rows() const;         ///< m, with the full ones
+  int columns() const;      ///< n
+  int sparse_rows() const;  ///< m less the full ones
 
   /// Writable storage for the sparse rows of C, in the order of the pattern; factor() overwrites
   /// it.
@@ -74,8 +75,8 @@ class SparseMinimumNorm {
   /// given k times each copy gets a k-th. Does not allocate, leaves residual() as it is.
   void multipliers(const double* dy, double* x);
 
-  int rank() const { return rows() - dropped(); }
-  int dropped() const;
+  int rank() const { return rows() - dropped(); }  ///< rows with d_k > 16 eps
+  int dropped() const;                             ///< the others
   /// k < rank(): kept rows; k >= rank(): dropped ones.
   int pivot(int k) const;
   /// Sine of the angle between row i and the rows before it in the order of elimination,

@@ -12,9 +12,9 @@ namespace tether::linalg {
 /// is not finite.
 template <int n>
 struct SymmetricEigen {
-  Matrix<n, 1> values;
-  Matrix<n, n> vectors;
-  bool converged;
+  Matrix<n, 1> values;   ///< ascending
+  Matrix<n, n> vectors;  ///< column k belongs to values[k]
+  bool converged;        ///< false: the others hold nothing
 };
 
 namespace detail {

@@ -21,18 +21,17 @@ const char* setting_name(CostMethod method);  ///< "tolerance"
 
 /// One setting of a scene.
 struct CostRow {
-  CostMethod method = CostMethod::smooth;
-  double setting = 0;
+  CostMethod method = CostMethod::smooth;  ///< engine
+  double setting = 0;                      ///< its tolerance, step or accuracy
   /// Bound on the error: the largest distance of a body's centre (m) and angle of its orientation
   /// (rad) from the reference, over the times below and all bodies. It includes what the reference
   /// may be off.
   double error = 0;
-  double seconds = 0;  ///< processor time of the engine, the least of several runs
-  double drift = 0, penetration = 0;
-  long steps = 0;
-  long contact_problems = 0;
-  int met = 0;          ///< expectations
-  std::string failure;  ///< empty: it reached the end
+  double seconds = 0;                 ///< processor time of the engine, the least of several runs
+  double drift = 0, penetration = 0;  ///< see Summary
+  long steps = 0, contact_problems = 0;  ///< see Counts
+  int met = 0;                           ///< expectations
+  std::string failure;                   ///< empty: it reached the end
 };
 
 /// Settings of a comparison; empty ones have defaults.
@@ -63,7 +62,7 @@ struct CostTable {
   double reference_error = 0;
   /// `CostOptions::reference` with which one row alone has the same reference; none: its default.
   std::optional<double> reference_setting;
-  bool interrupted = false;
+  bool interrupted = false;   ///< rows are missing
   std::vector<CostRow> rows;  ///< by method, in the order of the settings, loosest first
   /// The cheapest row with an error of at most `wanted`; null: there is none.
   const CostRow* cheapest(double wanted) const;

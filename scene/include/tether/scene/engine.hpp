@@ -18,12 +18,13 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
-/// World axes; position of the centre of mass.
+/// A body at Engine::time(), world axes.
 struct BodyState {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  linalg::Quaternion orientation = linalg::Quaternion::Identity();
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of the centre of mass, m
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; body to world
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();               ///< of the centre of mass, m/s
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< rad/s
+  /// Neither NaN nor infinity.
   bool is_finite() const {
     return position.allFinite() && orientation.coeffs().allFinite() && velocity.allFinite() &&
            angular_velocity.allFinite();
@@ -32,7 +33,8 @@ struct BodyState {
 
 /// A contact at Engine::time(), world axes; indices as Scene::bodies.
 struct ContactState {
-  int first = -1, second = -1;
+  int first = -1, second = -1;  ///< bodies
+  /// Place, m; unit, from `second` to `first`.
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< of the last step on `first`, N s
   double gap = 0;                                     ///< m; < 0: penetration
@@ -72,6 +74,7 @@ struct Forces {
 
 /// A change of one contact at an instant of the event engine. An instant may have several.
 struct ContactEvent {
+  /// The change.
   enum class Kind : std::uint8_t {
     impact,     ///< a gap closes with speed
     touch,      ///< a gap closes without
@@ -86,30 +89,36 @@ struct ContactEvent {
     roll,       ///< a contact begins to roll or spin against its moment of friction
     roll_stop   ///< it rolls or spins no longer
   };
-  double time = 0;  ///< s
-  Kind kind = Kind::impact;
+  double time = 0;               ///< s
+  Kind kind = Kind::impact;      ///< of the change
   int first = -1, second = -1;   ///< bodies; -1: none
   double before = 0, after = 0;  ///< normal velocities of an impact, m/s
   double lost = 0;               ///< energy of all contacts of the instant, in its first event, J
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on `first`, world axes, N s
   int joint = -1;                                     ///< whose limit, motor or friction; -1: none
 };
+/// The enumerator as text.
 const char* name(ContactEvent::Kind kind);
 
 /// Conserved quantities and errors at Engine::time(), SI.
 struct Diagnostics {
   double kinetic_energy = 0, potential_energy = 0;  ///< J; potential: gravity and springs
+  /// Sums over all bodies, kg m/s; about the origin, kg m^2/s.
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
-  double drift = 0;  ///< largest violation of a joint or an invariant that is kept (SI)
-  int contacts = 0;
+  double drift = 0;        ///< largest violation of a joint or an invariant that is kept (SI)
+  int contacts = 0;        ///< closed ones; stepping: all points of the last step
   double penetration = 0;  ///< m, deepest
   double residual = 0;     ///< of the last contact problem
 };
 
 /// Work of an engine since the start.
 struct Counts {
-  long steps = 0, residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
-  long contact_problems = 0, sweeps = 0, unsolved = 0, error_test_failures = 0;
+  long steps = 0;  ///< of IDA; stepping: of fixed length
+  /// Work of IDA and its projection; 0 in stepping.
+  long residual_evaluations = 0, jacobian_evaluations = 0, projections = 0;
+  long contact_problems = 0, sweeps = 0;  ///< solved, and sweeps over their contacts
+  long unsolved = 0;                      ///< contact problems above what is accepted
+  long error_test_failures = 0;           ///< of IDA; stepping with an accuracy: rejected sub-steps
   long accepted = 0;  ///< contact problems above the tolerance, within what is accepted
   long halved = 0;    ///< steps, or parts of them, taken in two halves
   /// Event engine: times at which something happens, a start with impacts included; contacts that
@@ -124,13 +133,14 @@ struct Counts {
           &sweeps, &unsolved, &error_test_failures, &accepted, &halved, &events, &impacts})
       f(*n);
   }
+  /// Adds each number.
   Counts& operator+=(Counts more);
 };
 
 /// A change of a run from events to steps.
 struct HandOver {
-  double time = 0;  ///< s
-  std::string why;
+  double time = 0;             ///< s
+  std::string why;             ///< a sentence
   Counts before;               ///< of the event engine, since the start
   std::optional<double> back;  ///< when events went on, s; nothing: steps have it
   double lost = 0;             ///< energy that the steps took, friction's work with it, J
@@ -138,8 +148,8 @@ struct HandOver {
 
 /// Wall time spent on one effect since the start, s.
 struct EffectCost {
-  std::string effect;
-  double seconds = 0;
+  std::string effect;  ///< "gravity", "contact", ...
+  double seconds = 0;  ///< wall time
 };
 
 /// A run that cannot go on; what() says what happened, when, and what to try.
@@ -152,39 +162,44 @@ class SimulationError : public std::runtime_error {
 class Engine {
  public:
   virtual ~Engine() = default;
-  virtual const char* name() const = 0;
-  virtual double time() const = 0;  ///< s
+  virtual const char* name() const = 0;  ///< "smooth", "stepping" or "event"
+  virtual double time() const = 0;       ///< s
   /// Moves to time t >= time(); stepping ends at the first step boundary not before t (to
   /// round-off). Throws SimulationError.
   virtual void advance(double t) = 0;
   virtual const std::vector<BodyState>& bodies() const = 0;  ///< as Scene::bodies
-  virtual Diagnostics diagnostics() const = 0;
+  virtual Diagnostics diagnostics() const = 0;               ///< at time()
+  /// At time(); none in a scene without shapes.
   virtual const std::vector<ContactState>& contacts() const = 0;
   /// Forces::joints and Forces::springs; see total_forces(). Throws SimulationError in an engine
   /// that does not know them.
   virtual Forces forces() const;
   /// Since the start, or the state that was restored.
   virtual const std::vector<ContactEvent>& events() const;
-  virtual Counts counts() const = 0;
+  virtual Counts counts() const = 0;  ///< since the start
   /// Changes to steps (EventOptions::otherwise) and back. If there are any, counts() has the work
   /// of steps and the number of events.
   virtual const std::vector<HandOver>& hand_overs() const;
   /// Work of the event engine, also of one that steps stand in for.
   virtual Counts counts_of_events() const { return counts(); }
+  /// Whether steps stand in for events now.
   bool in_steps() const { return !hand_overs().empty() && !hand_overs().back().back; }
-  virtual std::vector<EffectCost> costs() const = 0;
+  virtual std::vector<EffectCost> costs() const = 0;  ///< of each effect; the event engine has none
   /// Writes the state without changing it. An engine of the same scene that restores it continues
   /// bit by bit.
   virtual void save(std::ostream& out) const = 0;
-  /// Throws std::runtime_error on a state of other bodies and, with `exact`, on one that this build
-  /// cannot continue bit by bit; `near` then continues from its positions and velocities.
+  /// Whether a state is continued bit by bit, or from its positions and velocities where this build
+  /// cannot do so.
   enum class Restore : std::uint8_t { exact, near };
+  /// Goes on from a state that save() wrote. Throws std::runtime_error on a state of other bodies
+  /// and, with `exact`, on one that this build cannot continue bit by bit.
   virtual void restore(std::istream& in, Restore how = Restore::exact) = 0;
 
   /// Called after every step; if it returns true, advance() returns at the end of that step.
   void stop_when(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
 
  protected:
+  /// Asks the function of stop_when().
   bool interrupted() const { return interrupted_ && interrupted_(); }
 
  private:
@@ -194,9 +209,13 @@ class Engine {
 /// All of Forces.
 Forces total_forces(const Engine& engine);
 
-/// Each throws std::invalid_argument, naming what the scene asks for and the engine does not have.
+// Each throws std::invalid_argument, naming what the scene asks for and the engine does not have.
+
+/// Scenes without contact, by IDA with projection.
 std::unique_ptr<Engine> make_smooth_engine(const Scene& scene);
+/// Scenes with contact, by steps of impulses.
 std::unique_ptr<Engine> make_stepping_engine(const Scene& scene);
+/// Scenes with contact whose events are located, by IDA with projection between them.
 std::unique_ptr<Engine> make_event_engine(const Scene& scene);
 /// Events, and steps where these cannot go on, until what they could not decide is over. In steps
 /// its time is that of a boundary of them.

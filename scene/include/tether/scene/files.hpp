@@ -15,7 +15,7 @@ namespace tether::scene {
 
 /// One thing wrong in a scene file.
 struct Problem {
-  Place place;
+  Place place;          ///< in the file
   std::string field;    ///< e.g. `body "a": size`
   std::string value;    ///< as written; empty: nothing was written
   std::string allowed;  ///< what would be right
@@ -26,7 +26,8 @@ struct Problem {
 /// A scene file that cannot be used: all its problems (the first twenty), in order of place.
 class SceneError : public std::runtime_error {
  public:
-  explicit SceneError(std::vector<Problem> problems);
+  explicit SceneError(std::vector<Problem> problems);  ///< at least one
+  /// In order of place.
   const std::vector<Problem>& problems() const { return problems_; }
 
  private:

@@ -16,7 +16,8 @@ namespace tether::scene {
 /// s(t) = rate t + amplitude sin(2 pi frequency t + phase) - amplitude sin(phase), so that s(0) =
 /// 0.
 struct Motion {
-  double rate = 0, amplitude = 0, frequency = 0, phase = 0;  // m/s or rad/s; m or rad; Hz; rad
+  /// m/s or rad/s; m or rad; Hz; rad.
+  double rate = 0, amplitude = 0, frequency = 0, phase = 0;
 };
 
 /// Bounds on the angle of a hinge or the way of a slider, which are 0 at t = 0.
@@ -33,6 +34,7 @@ struct JointMotor {
   double stiffness = 0, damping = 0;  ///< N m/rad, N m s/rad; N/m, N s/m
   double target = 0;                  ///< rad, m
 
+  /// Whether it is a controlled drive.
   bool has_gains() const { return stiffness > 0 || damping > 0; }
 };
 
@@ -50,12 +52,13 @@ struct JointSpring {
 /// Couples the angles and ways s of hinges and sliders, which are 0 at t = 0. The sum of weight s
 /// is 0, or, of two joints, s_1 = polynomial(s_2), coefficients from degree 1 on.
 struct Coupling {
-  std::string name;
-  std::vector<int> joints;
-  std::vector<double> weights, polynomial;
-  Place place;
+  std::string name;                         ///< for messages
+  std::vector<int> joints;                  ///< indices of Scene::joints
+  std::vector<double> weights, polynomial;  ///< one for each joint; coefficients; one is empty
+  Place place;                              ///< in the file
 };
 
+/// Kinds of joints.
 enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal, planar };
 
 /// The words of files for them.
@@ -73,19 +76,19 @@ inline constexpr std::array<std::pair<std::string_view, JointKind>, 7> kJointWor
 /// at t = 0. A motion prescribes the angle of a hinge (rad, of first against second about axis),
 /// the displacement of a slider (m, of first along axis) or the change of a distance (m).
 struct Joint {
-  JointKind kind = JointKind::ball;
-  std::string name;
-  int first = -1, second = -1;
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  JointKind kind = JointKind::ball;                     ///< what it leaves free
+  std::string name;                                     ///< for messages and expectations
+  int first = -1, second = -1;                          ///< indices of bodies
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();         ///< its point, m
   Eigen::Vector3d at_second = Eigen::Vector3d::Zero();  ///< distance only: the point on `second`
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< hinge, slider, universal; planar: normal
-  std::optional<double> length;                     ///< distance: default the one at t = 0
-  std::optional<Motion> motion;
-  std::optional<JointLimits> limits;
-  std::optional<JointMotor> motor;
-  std::optional<JointSpring> spring;
+  std::optional<double> length;                     ///< distance, m: default the one at t = 0
+  std::optional<Motion> motion;                     ///< distance, hinge, slider
+  std::optional<JointLimits> limits;                ///< hinge, slider
+  std::optional<JointMotor> motor;                  ///< hinge, slider
+  std::optional<JointSpring> spring;                ///< hinge, slider, ball
   double friction = 0;  ///< of a hinge or slider: Coulomb's, at most this moment (N m) or force (N)
-  Place place;
+  Place place;          ///< in the file
   /// Universal only: the arm of the cross on `second`, at right angles to `axis`, that on `first`.
   Eigen::Vector3d axis_second = Eigen::Vector3d::UnitX();
 };

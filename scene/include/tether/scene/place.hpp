@@ -5,10 +5,10 @@
 
 namespace tether::scene {
 
-/// Line and column in a file; line 0: made by a program; column 0: not known.
+/// A place in a file.
 struct Place {
-  std::string file;
-  int line = 0, column = 0;
+  std::string file;          ///< its name
+  int line = 0, column = 0;  ///< from 1; line 0: made by a program; column 0: not known
 };
 
 }  // namespace tether::scene

@@ -13,6 +13,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
+/// The engines.
 enum class EngineKind : std::uint8_t { smooth, stepping, event };
 
 /// An effect that the scene names.
@@ -23,22 +24,23 @@ struct Effect {
 
 /// Exactly what the scene names is on. Sizes that do not apply are zero.
 struct Plan {
-  EngineKind engine = EngineKind::smooth;
-  std::string why;        ///< the engine
-  std::string no_event;   ///< why the event engine is not to be had; empty: it is
-  double then_steps = 0;  ///< s; > 0: of the steps that take over where events cannot go on
-  std::vector<Effect> effects;
+  EngineKind engine = EngineKind::smooth;  ///< that moves the scene
+  std::string why;                         ///< the engine
+  std::string no_event;                    ///< why the event engine is not to be had; empty: it is
+  double then_steps = 0;        ///< s; > 0: of the steps that take over where events cannot go on
+  std::vector<Effect> effects;  ///< all that act
 
-  int bodies = 0, moving = 0, shapes = 0;
-  int rows = 0;        ///< constraints of joints on positions
+  int bodies = 0, moving = 0, shapes = 0;  ///< bodies, those that are not fixed, shapes of all
+  int rows = 0;                            ///< constraints of joints on positions
   int unknowns = 0;    ///< smooth: of IDA, at most (rows that others imply are left out there);
                        ///< stepping: velocities; event: coordinates, velocities and work
   int invariants = 0;  ///< rows that the projection keeps beside those of the joints
   long pairs = 0;      ///< of bodies whose materials meet
 };
 
-/// Throws std::invalid_argument, naming what no engine has.
+/// Chooses the engine and lists what acts. Throws std::invalid_argument, naming what no engine has.
 Plan make_plan(const Scene& scene);
+/// Writes the text of `tether plan`.
 std::ostream& operator<<(std::ostream& out, const Plan& plan);
 
 /// The engine that the plan names. Throws std::invalid_argument.

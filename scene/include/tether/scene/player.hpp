@@ -20,8 +20,7 @@ namespace tether::scene {
 ///     player.write();
 ///
 /// At most 2001 frames and 12 MB of poses and contacts are kept; of longer runs every second,
-/// fourth,
-/// ... record, with the largest errors between them.
+/// fourth, ... record, with the largest errors between them.
 class Player {
  public:
   /// The scene must outlive the player. Throws std::invalid_argument if `file` is an output or the
@@ -29,6 +28,7 @@ class Player {
   Player(const Scene& scene, const std::string& file);
   ~Player();
 
+  /// Adds a frame at Engine::time().
   void record(const Engine& engine);
   /// Replaces the file, whole or not at all. Throws std::runtime_error.
   void write();

@@ -17,9 +17,9 @@ namespace tether::scene {
 
 /// Result of an [[expect]]; for one that holds `throughout`, at its worst instant.
 struct Judgement {
-  bool beyond = false;  ///< its time lies after the end (--end): it does not count
-  bool judged = false;  ///< the run reached its time
-  bool met = false;
+  bool beyond = false;        ///< its time lies after the end (--end): it does not count
+  bool judged = false;        ///< the run reached its time
+  bool met = false;           ///< it holds
   double time = 0;            ///< s
   std::vector<double> value;  ///< what was found
   double error = 0;           ///< largest difference to the value expected, 0 without one
@@ -27,15 +27,15 @@ struct Judgement {
 
 /// Over all records.
 struct Summary {
-  double start_energy = 0, end_energy = 0;       ///< J
-  double lowest_change = 0, largest_change = 0;  ///< J, of the energy since the start
-  double drift = 0, penetration = 0, residual = 0;
-  int contacts = 0;
+  double start_energy = 0, end_energy = 0;          ///< J
+  double lowest_change = 0, largest_change = 0;     ///< J, of the energy since the start
+  double drift = 0, penetration = 0, residual = 0;  ///< the largest; see Diagnostics
+  int contacts = 0;                                 ///< the most
 };
 
 /// Which of the processes that make the same run this is. Each writes its piece of a film.
 struct Processes {
-  int rank = 0, ranks = 1;
+  int rank = 0, ranks = 1;     ///< number of this one, from 0, and of all
   std::function<void()> meet;  ///< waits until all have called it
 };
 
@@ -59,18 +59,18 @@ struct RunOptions {
 
 /// Outcome of a run.
 struct RunResult {
-  std::string engine;
+  std::string engine;                        ///< Engine::name()
   double time = 0;                           ///< s, reached
   double seconds = 0;                        ///< processor time of the engine, all threads
   double wall = 0;                           ///< s on the clock, of the engine
   double whole_wall = 0, whole_seconds = 0;  ///< of the whole run, with what it records
   std::string failure;                       ///< why the run could not go on; empty: it could
   bool interrupted = false;                  ///< RunOptions::interrupted ended it
-  std::vector<HandOver> hand_overs;  ///< from events to steps, and back; see Engine::hand_overs()
-  Counts counts_of_events;           ///< with hand-overs; `counts` has those of steps then
-  Summary summary;
-  Counts counts;
-  std::vector<EffectCost> costs;
+  std::vector<HandOver> hand_overs;   ///< from events to steps, and back; see Engine::hand_overs()
+  Counts counts_of_events;            ///< with hand-overs; `counts` has those of steps then
+  Summary summary;                    ///< over all records
+  Counts counts;                      ///< of the engine
+  std::vector<EffectCost> costs;      ///< of each effect
   std::vector<Judgement> judgements;  ///< one for each Scene::expect
   std::vector<std::string> written;   ///< files
   std::vector<std::string> remarks;   ///< data that the files do not contain

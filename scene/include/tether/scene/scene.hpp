@@ -34,55 +34,55 @@ struct Drag {
 
 /// How the surface of a body moves against it: m/s, rad/s about the centre of mass, body axes.
 struct SurfaceSpeed {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s
 };
 
-/// Position of the centre of mass and orientation (body to world) at t = 0, velocities in world
-/// axes.
+/// A rigid body at t = 0.
 struct Body {
-  std::string name;
-  std::vector<Shape> shapes;
-  bool fixed = false;
-  double mass = 0;                                    ///< kg
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre, body axes, kg m^2
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  linalg::Quaternion orientation = linalg::Quaternion::Identity();
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
-  std::string material;
-  std::optional<Drag> drag;
-  std::optional<SurfaceSpeed> surface;
-  Place place;
+  std::string name;                                    ///< unique
+  std::vector<Shape> shapes;                           ///< in body axes; none: touches nothing
+  bool fixed = false;                                  ///< has no mass and does not move
+  double mass = 0;                                     ///< kg
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   ///< about the centre, body axes, kg m^2
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the centre of mass, m
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; body to world
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();               ///< m/s, world axes
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< rad/s, world axes
+  std::string material;                                             ///< that Pair refers to
+  std::optional<Drag> drag;                                         ///< none: no resistance
+  std::optional<SurfaceSpeed> surface;                              ///< none: moves with the body
+  Place place;                                                      ///< in the file
 };
 
 /// How two materials meet. A pair that no table names is an error when bodies of it can touch.
 /// A zero names no friction, no restitution.
 struct Pair {
-  std::string first, second;
-  double friction = 0;
-  double restitution = 0;  ///< 0 .. 1
-  Place place;
+  std::string first, second;          ///< materials
+  double friction = 0;                ///< coefficient, >= 0
+  double restitution = 0;             ///< 0 .. 1
+  Place place;                        ///< in the file
   bool touch = true;                  ///< false: they pass through each other
   double rolling = 0, torsional = 0;  ///< m: moments over the normal force
 };
 
-/// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points; torsional: about
-/// axis.
+/// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points.
 struct Spring {
-  std::string name;
-  int first = -1, second = -1;
+  std::string name;             ///< for messages and expectations
+  int first = -1, second = -1;  ///< indices of bodies, -1 the world
+  /// Its ends, world coordinates at t = 0, m.
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();
   double stiffness = 0, damping = 0;  ///< N/m, N s/m
   std::optional<double> rest;         ///< m; default the distance at t = 0
-  Place place;
+  Place place;                        ///< in the file
 };
 
 /// The factor of a load: mean + sin(2 pi frequency t + phase), or of a table.
 struct LoadHistory {
-  double mean = 0, frequency = 0, phase = 0;  // Hz, rad
+  double mean = 0, frequency = 0, phase = 0;  ///< factor, Hz, rad
+  /// A point of the table.
   struct Knot {
-    double time = 0, factor = 0;
+    double time = 0, factor = 0;  ///< s, and the factor then
   };
   /// Straight lines between them, two of one time are a jump; constant before and behind. Empty:
   /// the sine.
@@ -91,11 +91,11 @@ struct LoadHistory {
 
 /// A force at the centre and torque on one body; constant without a history.
 struct Load {
-  int body = 0;
-  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
-  Place place;
-  std::optional<LoadHistory> history = {};
-  bool in_body = false;  ///< the axes are those of the body, else the world's
+  int body = 0;                                                                       ///< index
+  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< N, N m
+  Place place;                              ///< in the file
+  std::optional<LoadHistory> history = {};  ///< a factor in time
+  bool in_body = false;                     ///< the axes are those of the body, else the world's
 };
 
 /// A point at rest that attracts every body: force -GM m r / |r|^3 at the centre of mass, r from
@@ -103,35 +103,41 @@ struct Load {
 struct CentralGravity {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< m
   double gravitational_parameter = 0;            ///< GM, m^3/s^2
-  Place place;
+  Place place;                                   ///< in the file
   bool gradient = false;  ///< with the torque and force of second order in (size / |r|)
 };
 
+/// Quantities that a smooth scene may keep, of all bodies together.
 enum class InvariantKind : std::uint8_t { energy, momentum, angular_momentum };
 
 /// A quantity that a smooth scene keeps.
 struct Invariant {
-  InvariantKind kind = InvariantKind::energy;
-  bool project = true;  ///< false: only recorded
-  Place place;
+  InvariantKind kind = InvariantKind::energy;  ///< which one
+  bool project = true;                         ///< false: only recorded
+  Place place;                                 ///< in the file
 };
 
+/// Form of the equations of motion with joints; stabilised_index2 is that of Gear, Gupta and
+/// Leimkuhler.
 enum class Formulation : std::uint8_t { index1, index0, stabilised_index2 };
+/// Consequence of a contact problem that is neither solved nor accepted: the run ends, or goes on
+/// with a warning.
 enum class OnFailure : std::uint8_t { stop, warn };
 
 /// Scenes without contact: IDA with projection.
 struct SmoothOptions {
   double tolerance = 1e-6;  ///< of the motion (SI); IDA's rtol and atol are a tenth of it
-  Formulation formulation = Formulation::index1;
-  bool projection = true;   ///< false: plain IDA
-  double max_step = 0;      ///< s; 0: free
+  Formulation formulation = Formulation::index1;  ///< of the equations of motion
+  bool projection = true;                         ///< false: plain IDA
+  double max_step = 0;                            ///< s; 0: free
   int max_steps = 1000000;  ///< between two stops (records, expectations); then the run is given up
 };
 
 /// Scenes with contact: impulse-velocity steps. Gravity is that of the scene.
 struct SteppingOptions : contact::SteppingOptions {
-  OnFailure on_failure = OnFailure::stop;
+  OnFailure on_failure = OnFailure::stop;  ///< where a contact problem stays unsolved
 
+  /// Defaults of scenes, which are more lenient than those of contact::Stepper.
   SteppingOptions() {
     acceptance = 1e5;
     max_halvings = 2;
@@ -147,11 +153,11 @@ enum class Otherwise : std::uint8_t {
 /// Scenes with contact whose impacts, slips and stops are found to a tolerance: IDA with projection
 /// between them.
 struct EventOptions {
-  double tolerance = 1e-6;    ///< of the motion and of event times (SI)
-  double max_step = 0;        ///< s; 0: free
-  int max_events = 1000000;   ///< then the run is given up
-  int max_steps = 100000000;  ///< of IDA
-  Otherwise otherwise = Otherwise::stop;
+  double tolerance = 1e-6;                ///< of the motion and of event times (SI)
+  double max_step = 0;                    ///< s; 0: free
+  int max_events = 1000000;               ///< then the run is given up
+  int max_steps = 100000000;              ///< of IDA
+  Otherwise otherwise = Otherwise::stop;  ///< where events cannot go on
 };
 
 /// The engine that a scene asks for; `automatic` leaves it to the plan.
@@ -161,7 +167,9 @@ enum class EngineChoice : std::uint8_t { automatic, smooth, stepping, event };
 struct Output {
   /// Names of files by their formats: csv, vtk, svg, state; empty: not written.
   std::map<std::string, std::string, std::less<>> files;
+  /// Name of the file of a format, which is added where there is none.
   std::string& operator[](std::string_view format) { return files[std::string(format)]; }
+  /// The same; empty where there is none.
   const std::string& operator[](std::string_view format) const {
     static const std::string none;
     const auto found = files.find(format);
@@ -172,6 +180,7 @@ struct Output {
   bool forces = false;    ///< in the table, in one of contacts beside it, and in the film
 };
 
+/// Subjects of an Expect; see there and docs/scene_fields.md.
 enum class Quantity : std::uint8_t {
   position,
   velocity,
@@ -216,11 +225,15 @@ constexpr int components(Quantity q) {
   }
 }
 
-/// A quantity of one body, one joint or one spring; the others belong to the scene.
+// Quantities that are of none of these belong to the scene.
+
+/// A quantity of one body.
 constexpr bool is_of_body(Quantity q) { return q <= Quantity::contact_slip; }
+/// A quantity of one joint.
 constexpr bool is_of_joint(Quantity q) {
   return q >= Quantity::joint_force && q <= Quantity::joint_drive;
 }
+/// A quantity of one spring.
 constexpr bool is_of_spring(Quantity q) { return q == Quantity::spring_force; }
 /// A quantity of Forces, or of the forces and slips of contacts.
 constexpr bool is_force(Quantity q) {
@@ -235,41 +248,43 @@ constexpr bool is_force(Quantity q) {
 /// are of contacts with the body `against` where one is named. For joint_... and spring_force see
 /// Forces.
 struct Expect {
-  double time = 0;          ///< s; stepping: the first step boundary not before it
-  bool throughout = false;  ///< holds at every record up to `time`, too
-  Quantity quantity = Quantity::position;
-  int body = -1, against = -1;  ///< against: -1, all
-  std::vector<double> value;
-  double within = 0;
-  std::optional<double> at_most, at_least;
-  Place place;
-  int joint = -1, spring = -1;  ///< of quantities of a joint, of a spring
+  double time = 0;                          ///< s; stepping: the first step boundary not before it
+  bool throughout = false;                  ///< holds at every record up to `time`, too
+  Quantity quantity = Quantity::position;   ///< what is judged
+  int body = -1, against = -1;              ///< of quantities of a body; against -1: all
+  std::vector<double> value;                ///< components(quantity) numbers, SI; or none
+  double within = 0;                        ///< in the unit of value
+  std::optional<double> at_most, at_least;  ///< bounds, in the unit of value
+  Place place;                              ///< in the file
+  int joint = -1, spring = -1;              ///< of quantities of a joint, of a spring
 };
 
 /// All that a scene file says, in SI units; see docs/scene_fields.md.
 struct Scene {
-  std::string name, file;
+  std::string name, file;                  ///< title; the file it was read from
   double end = 1;                          ///< s
   std::optional<Eigen::Vector3d> gravity;  ///< m/s^2; absent: none
   std::optional<Eigen::Vector3d> wind;     ///< m/s: drag is that of the speed against it
-  std::vector<Body> bodies;
-  std::vector<Pair> pairs;  ///< none: bodies do not touch
-  std::vector<Joint> joints;
-  std::vector<Coupling> couplings;
-  std::vector<Spring> springs;
-  std::vector<Load> loads;
-  std::vector<CentralGravity> central_gravity;
-  std::vector<Invariant> invariants;
-  EngineChoice engine = EngineChoice::automatic;
+  std::vector<Body> bodies;                ///< index i everywhere is body i
+  std::vector<Pair> pairs;                 ///< none: bodies do not touch
+  // Lists of what acts; empty: nothing of the kind.
+  std::vector<Joint> joints;                      ///< index i everywhere is joint i
+  std::vector<Coupling> couplings;                ///< between joints
+  std::vector<Spring> springs;                    ///< index i everywhere is spring i
+  std::vector<Load> loads;                        ///< on bodies
+  std::vector<CentralGravity> central_gravity;    ///< on all bodies
+  std::vector<Invariant> invariants;              ///< kept or recorded, in smooth scenes
+  EngineChoice engine = EngineChoice::automatic;  ///< that the file asks for
   /// Holds for both engines with contacts.
   contact::SimultaneousImpacts simultaneous_impacts = contact::SimultaneousImpacts::together;
-  std::optional<SmoothOptions> smooth;  ///< at most one of the three is given, but steps may
-  std::optional<SteppingOptions>
-      stepping;                       ///< be what events go on with (EventOptions::otherwise);
-  std::optional<EventOptions> event;  ///< none: the plan chooses with defaults
-  Output output;
-  std::vector<Expect> expect;
-  std::vector<std::string> surface_files;  ///< that were read with it; no output replaces them
+  // At most one of the three is given, but steps may be what events go on with
+  // (EventOptions::otherwise). None: the plan chooses with defaults.
+  std::optional<SmoothOptions> smooth;      ///< settings of the smooth engine
+  std::optional<SteppingOptions> stepping;  ///< settings of the stepping engine
+  std::optional<EventOptions> event;        ///< settings of the event engine
+  Output output;                            ///< files that a run writes
+  std::vector<Expect> expect;               ///< what a run must find
+  std::vector<std::string> surface_files;   ///< that were read with it; no output replaces them
 };
 
 /// Whether steps take over where events cannot go on.

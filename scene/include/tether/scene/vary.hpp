@@ -16,8 +16,8 @@ namespace tether::scene {
 /// "pair.friction", "body.ball.velocity.x", "spring.*.stiffness", "stepping.step". A field that is
 /// not in the file is added to its table.
 struct Setting {
-  std::string path;
-  double value = 0;
+  std::string path;  ///< of the number
+  double value = 0;  ///< in its place, in the units of the file
 };
 
 /// Reads a scene with numbers put in place of those of the file; each is checked as if it stood

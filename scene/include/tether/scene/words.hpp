@@ -11,7 +11,8 @@
 
 namespace tether::scene {
 
-/// Every value of E with its word.
+/// Every value of an enumeration E with its word: specialisations have a static `list` of (word,
+/// value) pairs.
 template <class E>
 struct Words;
 
@@ -23,6 +24,7 @@ std::vector<std::pair<std::string_view, E>> named(const Values& values) {
   return list;
 }
 
+/// @cond
 template <>
 struct Words<ShapeKind> {
   inline static const auto list = named<ShapeKind>(contact::kShapeKinds);
@@ -44,7 +46,7 @@ struct Words<contact::SimultaneousImpacts> {
       named<contact::SimultaneousImpacts>(contact::kSimultaneousImpacts);
 };
 
-/// Every friction law of the contact library can be named in a scene.
+// Every friction law of the contact library can be named in a scene.
 template <>
 struct Words<contact::Law> {
   inline static const auto list = named<contact::Law>(contact::laws());
@@ -127,6 +129,9 @@ struct Words<Quantity> {
   }};
 };
 
+/// @endcond
+
+/// The word of a value; "?" for none of the enumerators.
 template <class E>
 constexpr std::string_view word(E value) {
   for (const auto& [text, each] : Words<E>::list)
