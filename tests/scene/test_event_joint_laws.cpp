@@ -379,33 +379,32 @@ TEST_CASE("event: the table of events names the joint, and none where bodies tou
   CHECK(others >= 1);
 }
 
-TEST_CASE("event: a law's own normal does not count where contacts press themselves together") {
+TEST_CASE("event: a motor does not count where contacts press themselves together") {
   using namespace tether::scene::event;
   // Two contacts in one place that slide so that pressing opens them (Painleve, a_nn < mu a_nt),
-  // and nothing closes them: of their forces 0 is right. Beside them a motor, pressed with 10.
+  // and nothing closes them: of their forces 0 is right. Beside them a motor that is held with 10.
   const auto lawful = [](bool motor) {
-    const int n = motor ? 3 : 2;
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2 * n, 2 * n);
-    Eigen::VectorXd b = Eigen::VectorXd::Zero(2 * n), mu = Eigen::VectorXd::Constant(n, 2);
+    const int n = motor ? 5 : 4;
+    Eigen::MatrixXd A = Eigen::MatrixXd::Identity(n, n);
+    Eigen::VectorXd b = Eigen::VectorXd::Constant(n, 10);
     Eigen::Matrix2d each;
     each << 1, 0.8, 0.8, 1;
     for (int i = 0; i < 2; ++i) {
       for (int k = 0; k < 2; ++k) A.block<2, 2>(2 * i, 2 * k) = each;
       b.segment<2>(2 * i) << -0.3, -5;
     }
+    FrictionProblem problem{A, b, {{0, 1, 0, 2}, {2, 1, 2, 2}}};
     Regimes regimes;
     regimes.of.assign(2, tether::contact::Regime::sliding);
     regimes.directions.assign(2, Eigen::VectorXd::Ones(1));
     regimes.fixed.assign(2, true);
     if (motor) {
-      A.block<2, 2>(4, 4) = Eigen::Matrix2d::Identity();
-      b[4] = 10;
-      mu[2] = 1;
+      problem.parts.push_back({4, 1, -1, 0, 20});
       regimes.of.push_back(tether::contact::Regime::sticking);
       regimes.directions.emplace_back();
       regimes.fixed.push_back(false);
     }
-    return share_forces(A, b, mu, regimes).lawful;
+    return share_forces(problem, regimes).lawful;
   };
   CHECK_FALSE(lawful(false));
   CHECK_FALSE(lawful(true));

@@ -91,7 +91,7 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   collide(close, EventKind::impact, -1);
   if (!events_.empty()) ++counts_.events;
   // Figures of a scene are rounded: its energy is that of the start which joints allow.
-  const std::vector<ContactMode> modes = decide(touching(-1), -1, {});
+  const std::vector<ContactMode> modes = decide(touching(-1), {});
   motion_.choose(t, y_, modes);
   motion_.set_levels(std::vector<double>(at(model_.contacts()), 0.0));
   motion_.leave_energy_free();
@@ -389,9 +389,7 @@ void Driver::handle(const Zero& zero) {
            : zero.what == Watch::cone       ? slip_begins(zero.contact)
                                             : slip_ends(zero.contact),
            zero.contact, 0, 0, 0);
-  std::vector<ContactMode> modes =
-      decide(close, closing ? -1 : zero.contact,
-             closing ? std::optional<Watch>() : std::optional<Watch>(zero.what));
+  std::vector<ContactMode> modes = decide(close, closing ? Left() : Left{zero.contact, zero.what});
   if (zero.what == Watch::support) record_changes(modes_before, modes, zero.lag);
   motion_.choose(event_time_, y_, std::move(modes));
   begin_phase();

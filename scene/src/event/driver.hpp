@@ -98,18 +98,28 @@ class Driver {
   std::vector<int> struck(const std::vector<int>& near, int first);
   void strike(const std::vector<int>& set, bool plastic);
   struct Impact;
-  void refuse_blocked(const std::vector<int>& set, const Impact& impact, const MatrixXd& A);
-  Impact expect(const std::vector<int>& set, const VectorXd& before, int block, bool plastic);
+  void refuse_blocked(const ContactRows& rows, const Impact& impact);
+  Impact expect(const ContactRows& rows, const VectorXd& before, bool plastic);
   double change_velocities(const VectorXd& change);
-  void tell_impacts(const std::vector<int>& touching, const Impact& impact, const VectorXd& before,
+  void tell_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
                     const VectorXd& after, const VectorXd& x, double lost);
   bool has_accumulated(int contact, double approach, double& rest) const;
   double come_to_rest(const std::vector<int>& touching, double speed);
   void remember(int contact, double approach);
-  std::vector<ContactMode> decide(const std::vector<int>& touching, int left_contact,
-                                  std::optional<Watch> left);
+  /// The mode of a contact that an event has ended, by the function that was zero.
+  struct Left {
+    int contact = -1;
+    std::optional<Watch> by;
+  };
+  std::vector<ContactMode> decide(const std::vector<int>& touching, const Left& left);
+  std::vector<int> staying(const std::vector<int>& touching, const Left& left);
+  std::vector<VectorXd> slides_of(const ContactRows& rows, const VectorXd& velocities,
+                                  const Left& left);
+  bool lifts(const ContactRows& rows, int k, const AccelerationAnswer& answer) const;
+  ContactMode begins(const ContactRows& rows, int k, const AccelerationAnswer& answer,
+                     const Left& left) const;
   bool leaves_its_feature(int contact);
-  void jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu);
+  void jam(const ContactRows& rows, const VectorXd& velocities);
   std::vector<int> touching(int always) const;
   bool are_one(int contact, int other) const;
   std::vector<int> without_doubles(const std::vector<int>& contacts) const;
@@ -155,7 +165,7 @@ class Driver {
 
 /// An impact of contacts that touch: the right hand side of its problem w = A x - b.
 struct Driver::Impact {
-  VectorXd b, mu;
+  VectorXd b;
   std::vector<bool> hits;  ///< they close, and fast enough to count
   VectorXd rest;           ///< > 0: the contact's impacts are over after this time, s
   double fastest = 0;      ///< of those that are over: speed of approach

@@ -24,29 +24,26 @@ constexpr double kLeastHeight = 5e-12;  // of a flight, of the largest coordinat
 
 using linalg::at;
 
-constexpr double kNoImpulse = 1e-9;      // of the largest of an impact
-constexpr int kMostRounds = 2000;        // of one instant
-constexpr double kUnknownGap = 0.1;      // of its band
-constexpr double kHeldByJoints = 1e-10;  // of a normal's mobility without joints
+constexpr int kMostRounds = 2000;    // of one instant
+constexpr double kUnknownGap = 0.1;  // of its band
 
-constexpr double kNegligible = 3e-9;  // of the accelerations
-constexpr double kNoForce = 1e-9;     // of the largest, and of what accelerates bodies that much
-constexpr double kDependentForces = 1e-11, kImplied = 1e-9;  // of A_nn
-constexpr double kLeastApproach = 1e-12;                     // of the slip
+constexpr double kImplied = 1e-9;         // of A_nn
+constexpr double kLeastApproach = 1e-12;  // of the slip
 
 /// Whether the gap of contact k stays where those of the contacts with a force stay: which of them
 /// has none is the solver's choice, and no reason to leave it open.
 bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int k) {
-  const int block = rows.size();
+  const int row = rows.parts()[at(k)].first;
   std::vector<int> others;
-  for (int i = 0; i < static_cast<int>(answer.regimes.size()); ++i)
-    if (i != k && rows.has_normal(i) && answer.regimes[at(i)] != contact::Regime::separating)
-      others.push_back(block * i);
+  for (std::size_t i = 0; i < answer.regimes.size(); ++i)
+    if (const ConePart& p = rows.parts()[i];
+        p.has_normal() && p.first != row && answer.regimes[i] != contact::Regime::separating)
+      others.push_back(p.first);
   if (others.empty()) return false;
-  const SomeRows part(rows.A(), rows.A().col(block * k), others);
-  linalg::LeastSquares factor(kDependentForces);
+  const SomeRows part(rows.A(), rows.A().col(row), others);
+  linalg::LeastSquares factor(kDependent);
   factor.factor(part.A);
-  const double own = rows.A()(block * k, block * k);
+  const double own = rows.A()(row, row);
   return own - part.b.dot(VectorXd(factor.solve(part.b))) <= kImplied * own;
 }
 
@@ -85,15 +82,13 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
 // no faster stick: impulses in both directions. Returns the energy that is lost.
 double Driver::come_to_rest(const std::vector<int>& touching, double speed) {
   ContactRows rows(model_, touching);
-  const int block = rows.size();
   const VectorXd w = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   std::vector<int> slow;
-  for (int k = 0; k < static_cast<int>(touching.size()); ++k) {
-    if (model_.law(touching[at(k)]).is_moment() || std::abs(w[block * k]) > speed) continue;
-    slow.push_back(block * k);
-    if (!(model_.law(touching[at(k)]).friction > 0)) continue;
-    for (int j = 1; j < block; ++j)
-      if (std::abs(w[block * k + j]) <= speed) slow.push_back(block * k + j);
+  for (const ConePart& p : rows.parts()) {
+    if (!p.has_normal() || std::abs(w[p.first]) > speed) continue;
+    const int end = p.mu > 0 ? p.first + p.rows() : p.slip();
+    for (int row = p.first; row < end; ++row)
+      if (std::abs(w[row]) <= speed) slow.push_back(row);
   }
   const int n = static_cast<int>(slow.size());
   if (n == 0) return 0;
@@ -147,48 +142,44 @@ void Driver::collide(const std::vector<int>& near, EventKind otherwise, int cont
 }
 
 // Which of the contacts hit, and what their impacts restore.
-Driver::Impact Driver::expect(const std::vector<int>& set, const VectorXd& before, int block,
-                              bool plastic) {
-  const int n = static_cast<int>(set.size());
+Driver::Impact Driver::expect(const ContactRows& rows, const VectorXd& before, bool plastic) {
+  const int n = static_cast<int>(rows.contacts().size());
   Impact out;
   out.b = -before;
-  out.mu.resize(n);
   out.rest.setZero(n);
-  out.hits.assign(set.size(), false);
+  out.hits.assign(at(n), false);
   for (int k = 0; k < n; ++k) {
-    const int i = set[at(k)];
-    const ContactLaw law = model_.law(i);
-    const double approach = -before[block * k];
-    out.mu[k] = law.friction;
-    if (!law.has_normal() || approach <= bands().approach(i)) continue;
+    const int i = rows.contacts()[at(k)];
+    const ConePart& p = rows.parts()[at(k)];
+    const double approach = p.has_normal() ? -before[p.first] : 0;
+    if (!p.has_normal() || approach <= bands().approach(i)) continue;
     out.hits[at(k)] = true;
     if (plastic) continue;
     if (has_accumulated(i, approach, out.rest[k])) {
       out.fastest = std::max(out.fastest, approach);
       continue;
     }
-    out.b[block * k] += law.restitution * approach;
+    out.b[p.first] += model_.law(i).restitution * approach;
     remember(i, approach);
   }
   return out;
 }
 
 // Contacts that close though joints hold their normals: no impulse stops that.
-void Driver::refuse_blocked(const std::vector<int>& set, const Impact& impact, const MatrixXd& A) {
-  const Eigen::Index block = A.rows() / static_cast<Eigen::Index>(set.size());
+void Driver::refuse_blocked(const ContactRows& rows, const Impact& impact) {
   ContactLook look;
-  for (std::size_t k = 0; k < set.size(); ++k) {
+  for (std::size_t k = 0; k < impact.hits.size(); ++k) {
     if (!impact.hits[k]) continue;
-    model_.look(set[k], look);
+    const int contact = rows.contacts()[k], row = rows.parts()[k].first;
+    model_.look(contact, look);
     MatrixXd moved = look.normal.transpose();
     model_.divide_by_mass(moved);
     const double alone = look.normal.dot(moved.col(0));
-    const auto row = block * static_cast<Eigen::Index>(k);
-    if (!(A(row, row) <= kHeldByJoints * alone)) continue;
+    if (!(rows.A()(row, row) <= kHeldByJoints * alone)) continue;
     fail(
         fmt::format("no impulses keep {} apart: joints, prescribed motions or fixed bodies drive "
                     "them into each other",
-                    model_.contact_name(set[k])));
+                    model_.contact_name(contact)));
   }
 }
 
@@ -196,17 +187,16 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
   ContactRows rows(model_, set);
   const auto u = y_.segment(motion_.coordinates(), motion_.velocities());
   const VectorXd before = rows.velocities(u);
-  const Impact impact = expect(set, before, rows.size(), plastic);
-  refuse_blocked(set, impact, rows.A());
+  const Impact impact = expect(rows, before, plastic);
+  refuse_blocked(rows, impact);
   ++counts_.contact_problems;
-  const FrictionAnswer answer =
-      solve_impact(rows.A(), impact.b, impact.mu, bands().part, rows.holders());
+  const FrictionAnswer answer = solve_impact(rows.problem(impact.b), bands().part);
   if (!answer.solved)
     fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", set.size(),
                      answer.error));
   double lost = change_velocities(rows.change(answer.x));
   if (impact.fastest > 0) lost += come_to_rest(set, impact.fastest);
-  tell_impacts(set, impact, before, rows.velocities(u), answer.x, lost);
+  tell_impacts(rows, impact, before, rows.velocities(u), answer.x, lost);
 }
 
 // Returns the energy that is lost.
@@ -217,20 +207,21 @@ double Driver::change_velocities(const VectorXd& change) {
   return energy - model_.energy();
 }
 
-void Driver::tell_impacts(const std::vector<int>& touching, const Impact& impact,
-                          const VectorXd& before, const VectorXd& after, const VectorXd& x,
-                          double lost) {
-  const int n = static_cast<int>(touching.size()), block = static_cast<int>(x.size()) / n;
+void Driver::tell_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
+                          const VectorXd& after, const VectorXd& x, double lost) {
   double largest = 0;
-  for (int k = 0; k < n; ++k) largest = std::max(largest, x[block * k]);
+  for (const ConePart& p : rows.parts())
+    if (p.has_normal()) largest = std::max(largest, x[p.first]);
   bool first = true;
-  for (int k = 0; k < n; ++k) {
-    if (!impact.hits[at(k)] && x[block * k] <= kNoImpulse * largest) continue;
+  for (int k = 0; k < static_cast<int>(rows.parts().size()); ++k) {
+    const ConePart& p = rows.parts()[at(k)];
+    if (!p.has_normal() || (!impact.hits[at(k)] && x[p.first] <= kNoForce * largest)) continue;
     if (impact.hits[at(k)]) ++counts_.impacts;
     const bool over = impact.rest[k] > 0;
-    record(over ? EventKind::rest : EventKind::impact, touching[at(k)], before[block * k],
-           after[block * k], first ? lost : 0);
-    events_.back().impulse = model_.in_space(touching[at(k)], x.segment(block * k, block));
+    const int contact = rows.contacts()[at(k)];
+    record(over ? EventKind::rest : EventKind::impact, contact, before[p.first], after[p.first],
+           first ? lost : 0);
+    events_.back().impulse = model_.in_space(contact, rows.of(k, x));
     if (over) events_.back().time = event_time_ + impact.rest[k];
     first = false;
   }
@@ -238,100 +229,110 @@ void Driver::tell_impacts(const std::vector<int>& touching, const Impact& impact
 
 // By Coulomb's law for accelerations (method, section 6), see solve_accelerations.
 
-std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, int left_contact,
-                                        std::optional<Watch> left) {
+std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const Left& left) {
   std::vector<ContactMode> modes(at(model_.contacts()));
-  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
-  std::vector<int> candidates;
-  double rate = 0;
-  for (const int i : touching) {
-    if (i == left_contact && left == Watch::border) continue;
-    if (left == Watch::normal_force && are_one(i, left_contact)) continue;
-    model_.gap(i, rate);
-    if (std::abs(rate) <= bands().approach(i) && !leaves_its_feature(i)) candidates.push_back(i);
-  }
+  const std::vector<int> candidates = staying(touching, left);
   if (candidates.empty()) return modes;
-  for (const int i : candidates) {
-    const std::string why = model_.undecided(i);
-    if (!why.empty()) fail(why);
-  }
-  candidates = with_moments(without_doubles(candidates));
   ContactRows rows(model_, candidates);
-  const int block = rows.size(), n = static_cast<int>(candidates.size());
-  const VectorXd velocities = rows.velocities(u);
-  VectorXd mu(n);
-  std::vector<VectorXd> slides(at(n));
-  for (int k = 0; k < n; ++k) {
-    const int i = candidates[at(k)];
-    mu[k] = model_.law(i).friction;
-    const VectorXd s = velocities.segment(block * k + 1, block - 1);
-    VectorXd& d = slides[at(k)];
-    if (i == left_contact && left == Watch::cone) {
-      // The force is on the border of the cone and opposes the slip that begins.
-      for (std::size_t c = 0; c < motion_.closed().size(); ++c)
-        if (motion_.closed()[c] == i) {
-          VectorXd rate_there(motion_.size());
-          motion_.rate(event_time_, y_.data(), rate_there.data());
-          d = -motion_.friction_force(static_cast<int>(c)).normalized();
-        }
-    } else if (s.norm() > bands().slip(i) && !(i == left_contact && left == Watch::slip)) {
-      d = s.normalized();
-    }
-  }
+  const VectorXd velocities =
+      rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
+  const std::vector<VectorXd> slides = slides_of(rows, velocities, left);
   ++counts_.contact_problems;
   std::vector<bool> closed;
   for (const int i : candidates) closed.push_back(motion_.modes()[at(i)].mode != Mode::open);
-  const AccelerationAnswer solved =
-      solve_accelerations(model_, rows, slides, bands().of_accelerations(), closed);
-  const FrictionAnswer& answer = solved.contacts;
-  if (!answer.solved) fail("the forces of closed contacts are not solved");
+  const AccelerationAnswer answer =
+      solve_accelerations(rows, slides, bands().of_accelerations(), closed);
+  if (!answer.contacts.solved) fail("the forces of closed contacts are not solved");
+  const int n = static_cast<int>(candidates.size());
   for (int k = 0; k < n && !jammed_; ++k)
-    if (slides[at(k)].size() > 0 && answer.regimes[at(k)] == contact::Regime::sticking &&
-        velocities.segment(block * k + 1, block - 1).norm() > bands().slip(candidates[at(k)])) {
-      jam(rows, velocities, mu);
+    if (slides[at(k)].size() > 0 && answer.contacts.regimes[at(k)] == contact::Regime::sticking &&
+        rows.parts()[at(k)].slip_of(velocities).norm() > bands().slip(candidates[at(k)])) {
+      jam(rows, velocities);
       jammed_ = true;
-      return decide(this->touching(-1), -1, {});
+      return decide(this->touching(-1), {});
     }
   jammed_ = false;
   for (int k = 0; k < n; ++k) {
-    const int i = candidates[at(k)];
-    ContactMode& mode = modes[at(i)];
-    const bool bounded = model_.law(i).is_bounded();
-    const contact::Regime regime = answer.regimes[at(k)];
-    const bool moment = model_.law(i).is_moment();
-    if (moment && modes[at(model_.law(i).held_by)].mode == Mode::open) continue;
-    if (regime == contact::Regime::separating && !bounded && !moment &&
-        !(std::abs(answer.w[block * k]) <= kNegligible * solved.scale &&
-          rests_on_others(rows, answer, k)))
-      continue;
-    bool lifted = false;
-    for (int j = 0; j < model_.contacts() && !lifted; ++j) lifted = lifted_[at(j)] && are_one(i, j);
-    const double force = answer.x[block * k];
-    if (lifted && !moment &&
-        (force <= kNoForce * answer.x.cwiseAbs().maxCoeff() ||
-         force * rows.A()(block * k, block * k) <= kNoForce * solved.scale))
-      continue;  // contacts whose forces vanish together lift together
-    const VectorXd& d = slides[at(k)];
-    if (d.size() > 0) {
-      mode.mode = Mode::slide;
-      mode.direction = d;
-      continue;
-    }
-    // On the border of its cone a contact may be said to slide though nothing moves it.
-    const VectorXd a = answer.w.segment(block * k + 1, block - 1);
-    const bool still = a.norm() <= kNegligible * solved.scale;
-    if ((regime == contact::Regime::sticking || still) && mu[k] > 0) {
-      mode.mode = Mode::stick;
-      continue;
-    }
-    mode.mode = Mode::slide;
-    mode.direction = a.norm() > 0 ? VectorXd(a.normalized()) : VectorXd::Unit(block - 1, 0);
-    const bool same = i == left_contact && left == Watch::slip &&
-                      mode.direction.dot(motion_.modes()[at(i)].direction) > 0.5;
-    if (same && mu[k] > 0) mode.mode = Mode::stick;
+    const int i = candidates[at(k)], by = model_.law(i).held_by;
+    if (by >= 0 ? modes[at(by)].mode == Mode::open : lifts(rows, k, answer)) continue;
+    modes[at(i)] = slides[at(k)].size() > 0 ? ContactMode{Mode::slide, slides[at(k)]}
+                                            : begins(rows, k, answer, left);
   }
   return modes;
+}
+
+// Contacts that touch and stay where they are; what is left is not among them.
+std::vector<int> Driver::staying(const std::vector<int>& touching, const Left& left) {
+  std::vector<int> out;
+  double rate = 0;
+  for (const int i : touching) {
+    if (i == left.contact && left.by == Watch::border) continue;
+    if (left.by == Watch::normal_force && are_one(i, left.contact)) continue;
+    model_.gap(i, rate);
+    if (std::abs(rate) <= bands().approach(i) && !leaves_its_feature(i)) out.push_back(i);
+  }
+  for (const int i : out) {
+    const std::string why = model_.undecided(i);
+    if (!why.empty()) fail(why);
+  }
+  return with_moments(without_doubles(out));
+}
+
+// Directions of what slides; empty for what does not.
+std::vector<VectorXd> Driver::slides_of(const ContactRows& rows, const VectorXd& velocities,
+                                        const Left& left) {
+  std::vector<VectorXd> out(rows.contacts().size());
+  for (int k = 0; k < static_cast<int>(out.size()); ++k) {
+    const int i = rows.contacts()[at(k)];
+    const VectorXd slip = rows.of(k, velocities).tail(model_.tangents());
+    if (i != left.contact || (left.by != Watch::cone && left.by != Watch::slip)) {
+      if (slip.norm() > bands().slip(i)) out[at(k)] = slip.normalized();
+      continue;
+    }
+    // The force is on the border of the cone and opposes the slip that begins.
+    for (std::size_t c = 0; c < motion_.closed().size() && left.by == Watch::cone; ++c)
+      if (motion_.closed()[c] == i) {
+        VectorXd rate_there(motion_.size());
+        motion_.rate(event_time_, y_.data(), rate_there.data());
+        out[at(k)] = -motion_.friction_force(static_cast<int>(c)).normalized();
+      }
+  }
+  return out;
+}
+
+// Whether a contact with a normal opens.
+bool Driver::lifts(const ContactRows& rows, int k, const AccelerationAnswer& answer) const {
+  const ConePart& p = rows.parts()[at(k)];
+  if (!p.has_normal()) return false;
+  const FrictionAnswer& forces = answer.contacts;
+  if (forces.regimes[at(k)] == contact::Regime::separating &&
+      !(std::abs(forces.w[p.first]) <= kNoChange * answer.scale &&
+        rests_on_others(rows, forces, k)))
+    return true;
+  bool lifted = false;
+  for (int j = 0; j < model_.contacts() && !lifted; ++j)
+    lifted = lifted_[at(j)] && are_one(rows.contacts()[at(k)], j);
+  // Contacts whose forces vanish together lift together.
+  const double force = forces.x[p.first];
+  return lifted && (force <= kNoForce * forces.x.cwiseAbs().maxCoeff() ||
+                    force * rows.A()(p.first, p.first) <= kNoForce * answer.scale);
+}
+
+// The mode of a contact that stays closed and had no slip.
+ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationAnswer& answer,
+                           const Left& left) const {
+  const int i = rows.contacts()[at(k)];
+  const VectorXd a = rows.of(k, answer.contacts.w).tail(model_.tangents());
+  // On the border of its cone a contact may be said to slide though nothing moves it.
+  const bool still = a.norm() <= kNoChange * answer.scale;
+  const bool sticks = answer.contacts.regimes[at(k)] == contact::Regime::sticking || still;
+  ContactMode mode{Mode::slide,
+                   a.norm() > 0 ? VectorXd(a.normalized()) : VectorXd::Unit(a.size(), 0)};
+  const bool same = i == left.contact && left.by == Watch::slip &&
+                    mode.direction.dot(motion_.modes()[at(i)].direction) > 0.5;
+  if (!(model_.law(i).friction > 0) || !(sticks || same)) return mode;
+  return {Mode::stick, sticks ? VectorXd() : mode.direction};
 }
 
 // It is at the border of its face or edge, and on its way out; another contact takes its place.
@@ -343,27 +344,24 @@ bool Driver::leaves_its_feature(int contact) {
 
 // Forces without bound stop the slip in no time: the impulses that keep the contacts from closing
 // at the least speed of approach.
-void Driver::jam(const ContactRows& rows, const VectorXd& velocities, const VectorXd& mu) {
-  const int block = rows.size();
-  VectorXd b = -velocities;
-  VectorXd friction = mu;
-  for (int k = 0; k < mu.size(); ++k) {
-    if (rows.has_normal(k) || rows.is_bounded(k))
-      b[block * k] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
-    if (rows.is_bounded(k)) friction[k] = 0;  // no impulse
+void Driver::jam(const ContactRows& rows, const VectorXd& velocities) {
+  FrictionProblem problem = rows.problem(-velocities);
+  for (ConePart& p : problem.parts) {
+    p.bound = 0;  // no impulse
+    if (p.has_normal()) problem.b[p.first] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
   }
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(rows.A(), b, friction, rows.holders());
+  const FrictionAnswer answer = solve_friction(problem);
   if (!answer.solved) fail("an impact without collision is not solved");
   const double lost = change_velocities(rows.change(answer.x));
+  const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   bool first = true;
-  for (int k = 0; k < mu.size(); ++k) {
-    if (answer.x[block * k] <= 0 || rows.is_bounded(k)) continue;
-    record(EventKind::jam, rows.contacts()[at(k)], velocities[block * k],
-           rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()))[block * k],
-           first ? lost : 0);
-    events_.back().impulse =
-        model_.in_space(rows.contacts()[at(k)], answer.x.segment(block * k, block));
+  for (int k = 0; k < static_cast<int>(rows.parts().size()); ++k) {
+    const ConePart& p = rows.parts()[at(k)];
+    if (!p.has_normal() || answer.x[p.first] <= 0) continue;
+    const int contact = rows.contacts()[at(k)];
+    record(EventKind::jam, contact, velocities[p.first], after[p.first], first ? lost : 0);
+    events_.back().impulse = model_.in_space(contact, rows.of(k, answer.x));
     first = false;
   }
 }

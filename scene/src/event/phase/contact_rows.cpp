@@ -9,33 +9,9 @@ namespace tether::scene::event {
 
 using linalg::at;
 
-namespace {
-
-constexpr double kDependentJoints = 1e-11;
-constexpr double kHeldMoment = 1e-10;  // of the mobility without joints
-
-}  // namespace
-
 ContactRows::ContactRows(Model& model, std::vector<int> contacts)
-    : model_(model),
-      contacts_(std::move(contacts)),
-      block_(1 + model.tangents()),
-      factor_(kDependentJoints) {
-  const int n = block_ * static_cast<int>(contacts_.size());
-  L_.resize(n, model.velocities());
-  rate_.resize(n);
-  rest_.resize(n);
-  ContactLook look;
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const int row = block_ * static_cast<int>(k);
-    model.look(contacts_[k], look);
-    L_.row(row) = look.normal;
-    rate_[row] = look.normal_rate;
-    rest_[row] = look.normal_rest;
-    L_.middleRows(row + 1, block_ - 1) = look.tangents;
-    rate_.segment(row + 1, block_ - 1) = look.slip_rate;
-    rest_.segment(row + 1, block_ - 1) = look.slip_rest;
-  }
+    : model_(model), contacts_(std::move(contacts)), factor_(kDependent) {
+  take_rows();
   PL_ = L_.transpose();
   model.divide_by_mass(PL_);
   if (model.joint_rows() > 0) {
@@ -54,47 +30,70 @@ ContactRows::ContactRows(Model& model, std::vector<int> contacts)
     A_ = L_ * PL_;
   }
   A_ = (0.5 * (A_ + A_.transpose())).eval();
-  find_holders();
-  if (!holders_.empty() && G_.rows() > 0) free_held_moments();
-  complete();
+  if (G_.rows() > 0) free_held();
 }
 
-bool ContactRows::is_bounded(int k) const { return model_.law(contacts_[at(k)]).is_bounded(); }
-
-void ContactRows::find_holders() {
-  const auto begin = contacts_.begin();
+// A limit has no slip, a bounded law and a moment have no normal of their own.
+void ContactRows::take_rows() {
+  std::vector<ContactLook> looks(contacts_.size());
+  int rows = 0;
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    const int by = model_.law(contacts_[k]).held_by;
-    if (by < 0) continue;
-    holders_.resize(contacts_.size(), -1);
-    holders_[k] = static_cast<int>(std::find(begin, contacts_.end(), by) - begin);
+    const ContactLaw law = model_.law(contacts_[k]);
+    model_.look(contacts_[k], looks[k]);
+    ConePart p;
+    p.first = rows;
+    p.slips = law.is_line() ? 1 : looks[k].tangents.isZero(0) ? 0 : model_.tangents();
+    p.mu = law.is_bounded() ? 0 : law.friction;
+    p.bound = std::max(0.0, law.bound);
+    if (law.has_normal()) p.normal = rows;
+    if (law.is_moment())
+      p.normal =
+          parts_[at(static_cast<int>(std::find(contacts_.begin(), contacts_.end(), law.held_by) -
+                                     contacts_.begin()))]
+              .first;
+    parts_.push_back(p);
+    rows += p.rows();
+  }
+  L_.resize(rows, model_.velocities());
+  rate_.resize(rows);
+  rest_.resize(rows);
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const ConePart& p = parts_[k];
+    if (p.has_normal()) {
+      L_.row(p.first) = looks[k].normal;
+      rate_[p.first] = looks[k].normal_rate;
+      rest_[p.first] = looks[k].normal_rest;
+    }
+    L_.middleRows(p.slip(), p.slips) = looks[k].tangents.topRows(p.slips);
+    p.slip_of(rate_) = looks[k].slip_rate.head(p.slips);
+    p.slip_of(rest_) = looks[k].slip_rest.head(p.slips);
   }
 }
 
-// Moments about axes that joints hold do nothing: what is left of them is rounding.
-void ContactRows::free_held_moments() {
-  MatrixXd alone = L_.transpose();
-  model_.divide_by_mass(alone);
-  for (std::size_t k = 0; k < contacts_.size(); ++k) {
-    if (holders_[k] < 0) continue;
-    const int row = block_ * static_cast<int>(k);
-    double most = 0;
-    for (int i = row + 1; i < row + block_; ++i) most = std::max(most, L_.row(i).dot(alone.col(i)));
-    for (int i = row + 1; i < row + block_; ++i) {
-      if (A_(i, i) > kHeldMoment * most) continue;
+VectorXd ContactRows::of(int k, const VectorXd& values) const {
+  const ConePart& p = parts_[at(k)];
+  VectorXd out = VectorXd::Zero(1 + model_.tangents());
+  if (p.has_normal()) out[0] = values[p.first];
+  out.segment(1, p.slips) = p.slip_of(values);
+  return out;
+}
+
+// Bounded laws and moments about axes that joints hold do nothing: what is left of their mobility
+// is rounding.
+void ContactRows::free_held() {
+  for (const ConePart& p : parts_) {
+    if (p.has_normal()) continue;
+    MatrixXd alone = L_.middleRows(p.first, p.slips).transpose();
+    model_.divide_by_mass(alone);
+    const double most =
+        L_.middleRows(p.first, p.slips).cwiseProduct(alone.transpose()).rowwise().sum().maxCoeff();
+    for (int i = p.first; i < p.first + p.slips; ++i) {
+      if (A_(i, i) > kHeldByJoints * most) continue;
       A_.row(i).setZero();
       A_.col(i).setZero();
       PL_.col(i).setZero();
       A_(i, i) = most;
     }
-  }
-}
-
-void ContactRows::complete() {
-  for (int k = 0; k < static_cast<int>(contacts_.size()); ++k) {
-    const int row = block_ * k, there = has_normal(k) ? row : row + 1;
-    for (int i = row; i < row + block_; ++i)
-      if (L_.row(i).isZero(0)) A_(i, i) = A_(there, there);
   }
 }
 

@@ -15,138 +15,132 @@ using linalg::at;
 namespace {
 
 constexpr double kLocked = 1e-12;  // A_nn of the largest
-constexpr double kSolve = 1e-12;
+constexpr double kSolve = 1e-12, kNear = 1e-8;
 constexpr double kFarAbove = 1e5;
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
-// Bounds relative to the forces that accelerations ask for, see BoundedLaws.
-constexpr double kCutBound = 1e3, kMostBound = 1e12;
-constexpr double kNoChange = 3e-9;  // of accelerations or velocities
 
-constexpr double kNear = 1e-8;
-
-template <class Solution>
-bool is_solved(const Solution& answer) {
-  return answer.status == contact::Status::solved || answer.status == contact::Status::round_off ||
-         (answer.error < kNear && answer.status != contact::Status::infeasible);
-}
-
-/// Row and column 0 of a moment are nobody's, of one about the normal (whose second tangent no
-/// other row moves) the last, too.
-bool is_spin(const MatrixXd& A, int first) {
-  return A.row(first + 2).cwiseAbs().sum() == A(first + 2, first + 2) &&
-         A(first + 2, first + 2) > 0;
-}
-
-/// The cone of a contact with its moments, and where its rows are in blocks of three.
-struct Held {
-  Cone cone;
-  std::vector<int> rows;
-};
-
-Held cone_of(const MatrixXd& A, const VectorXd& mu, const Holders& holders, int contact) {
-  int spin = -1, rolling = -1;
-  for (int k = contact + 1; k < static_cast<int>(holders.size()); ++k)
-    if (holders[at(k)] == contact) (spin < 0 && is_spin(A, 3 * k) ? spin : rolling) = k;
-  Held out;
-  for (int k = 0; k < 3; ++k) out.rows.push_back(3 * contact + k);
-  if (spin >= 0) out.rows.push_back(3 * spin + 1);
-  if (rolling >= 0)
-    for (int k = 1; k < 3; ++k) out.rows.push_back(3 * rolling + k);
-  const double m = mu[contact], r = rolling >= 0 ? mu[rolling] : 0, s = spin >= 0 ? mu[spin] : 0;
-  out.cone = rolling < 0 ? (spin < 0 ? Cone::friction(m) : Cone::with_torsional(m, s))
-             : spin < 0  ? Cone::with_rolling(m, r)
-                         : Cone::with_rolling(m, r, s);
-  return out;
-}
-
-/// Sticking if the rest of the bound, as a velocity, is at least the slip.
-Regime regime_of(double mobility, double left, double slip) {
-  return mobility * left < slip ? Regime::sliding : Regime::sticking;
-}
-
-/// Solves w = A x - b for blocks (normal, tangents): friction cones, and where there are moments
-/// the cones of rolling and torsional friction that these make with the contacts which hold them.
-/// Starts where the last solve ended.
-class ConeBlocks {
- public:
-  ConeBlocks(const contact::Options& options, const Holders& holders)
-      : contacts_(options), cones_(options), holders_(holders) {}
-  FrictionAnswer solve(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
-
- private:
-  FrictionAnswer solve_with_moments(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
-
-  contact::Solver contacts_;
-  contact::ConeSolver cones_;
-  Holders holders_;
-  VectorXd last_;
-};
-
-FrictionAnswer ConeBlocks::solve(const MatrixXd& A, const VectorXd& b, const VectorXd& mu) {
-  if (!holders_.empty()) return solve_with_moments(A, b, mu);
-  if (last_.size() == 0) last_.setZero(b.size());
-  const contact::Solution found = contacts_.solve(contact::Problem::dense(A, b, mu), last_);
-  last_ = found.impulses;
-  return {is_solved(found), found.impulses, found.velocities, found.regimes, found.error};
-}
-
-FrictionAnswer ConeBlocks::solve_with_moments(const MatrixXd& A, const VectorXd& b,
-                                              const VectorXd& mu) {
-  const int n = static_cast<int>(mu.size());
+/// The cones of a problem, and their rows in it. Those without a bound, and those of contacts that
+/// the joints lock, are left out.
+struct Product {
   std::vector<Cone> cones;
   std::vector<int> rows;
-  for (int i = 0; i < n; ++i) {
-    if (is_held(holders_, i)) continue;
-    const Held each = cone_of(A, mu, holders_, i);
-    cones.push_back(each.cone);
-    rows.insert(rows.end(), each.rows.begin(), each.rows.end());
+
+  explicit Product(const FrictionProblem& problem) {
+    double largest = 0;
+    for (const ConePart& p : problem.parts)
+      if (p.has_normal()) largest = std::max(largest, problem.A(p.first, p.first));
+    for (const ConePart& p : problem.parts) {
+      if (p.normal < 0 && p.bound > 0) {
+        cones.push_back(Cone::bounded(p.bound));
+        take(p);
+      }
+      if (!p.has_normal() || !(problem.A(p.first, p.first) > kLocked * largest)) continue;
+      take(p);
+      double length[2] = {0, 0};  // of the moments about the normal, across it
+      for (int k = 0; k < 2; ++k)
+        for (const ConePart& q : problem.parts)
+          if (q.is_held() && q.normal == p.first && q.slips == k + 1) {
+            take(q);
+            length[k] = q.mu;
+          }
+      cones.push_back(cone_of(p, length));
+    }
   }
-  const SomeRows part(A, b, rows);
-  const auto problem = contact::ConeProblem::dense(part.A, part.b, std::move(cones));
-  const contact::ConeSolution found =
-      last_.size() > 0 ? cones_.solve(problem, last_) : cones_.solve(problem);
-  last_ = found.impulses;
-  FrictionAnswer out;
-  out.solved = is_solved(found);
-  out.error = found.error;
-  out.x.setZero(b.size());
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    out.x[rows[r]] = found.impulses[static_cast<Eigen::Index>(r)];
-  out.w = A * out.x - b;
-  for (int i = 0; i < n; ++i) {
-    const int row = 3 * i, normal = is_held(holders_, i) ? 3 * holders_[at(i)] : row;
-    const double force = out.x[normal], slip = out.w.segment<2>(row + 1).norm();
-    const double left = mu[i] * force - out.x.segment<2>(row + 1).norm();
-    const bool open = !(A(normal, normal) * force > out.w[normal]);
-    out.regimes.push_back(
-        open ? Regime::separating
-             : regime_of(0.5 * (A(row + 1, row + 1) + A(row + 2, row + 2)), left, slip));
+
+ private:
+  void take(const ConePart& p) {
+    for (int k = 0; k < p.rows(); ++k) rows.push_back(p.first + k);
   }
-  return out;
+  static Cone cone_of(const ConePart& p, const double length[2]) {
+    if (p.slips == 0) return Cone::nonnegative();
+    if (p.slips == 1) return Cone::planar(p.mu);
+    if (length[0] == 0 && length[1] == 0) return Cone::friction(p.mu);
+    if (length[1] == 0) return Cone::with_torsional(p.mu, length[0]);
+    return length[0] == 0 ? Cone::with_rolling(p.mu, length[1])
+                          : Cone::with_rolling(p.mu, length[1], length[0]);
+  }
+};
+
+/// Sticking where the rest of the limit, as a velocity, is at least the slip.
+Regime regime_of(const FrictionProblem& problem, const ConePart& p, const FrictionAnswer& found) {
+  if (p.normal >= 0 && !(problem.A(p.normal, p.normal) * found.x[p.normal] > found.w[p.normal]))
+    return Regime::separating;
+  if (p.slips == 0) return Regime::sliding;
+  const double mobility = problem.A.diagonal().segment(p.slip(), p.slips).mean();
+  const double left = p.limit(found.x) - p.slip_of(found.x).norm();
+  return mobility * left < p.slip_of(found.w).norm() ? Regime::sliding : Regime::sticking;
 }
+
+/// Starts where the last solve ended.
+class ProductSolver {
+ public:
+  explicit ProductSolver(double max_work = contact::Options().max_work)
+      : solver_([&] {
+          contact::Options options;
+          options.law = contact::Law::coulomb;
+          options.tolerance = kSolve;
+          options.strict = true;
+          options.max_work = max_work;
+          return options;
+        }()) {}
+
+  FrictionAnswer solve(const FrictionProblem& problem) {
+    FrictionAnswer out;
+    out.x.setZero(problem.b.size());
+    out.w = -problem.b;
+    out.regimes.assign(problem.parts.size(), Regime::separating);
+    if (!problem.A.allFinite() || !problem.b.allFinite()) {  // the motion has left the numbers
+      out.error = std::numeric_limits<double>::infinity();
+      return out;
+    }
+    const Product product(problem);
+    out.solved = product.rows.empty();
+    if (out.solved) return out;
+    const SomeRows rows(problem.A, problem.b, product.rows);
+    const auto cones = contact::ConeProblem::dense(rows.A, rows.b, product.cones);
+    const contact::ConeSolution found =
+        last_.size() > 0 ? solver_.solve(cones, last_) : solver_.solve(cones);
+    last_ = found.impulses;
+    out.error = found.error;
+    out.solved = found.status == contact::Status::solved ||
+                 found.status == contact::Status::round_off ||
+                 (found.error < kNear && found.status != contact::Status::infeasible);
+    for (std::size_t r = 0; r < product.rows.size(); ++r)
+      out.x[product.rows[r]] = found.impulses[static_cast<Eigen::Index>(r)];
+    out.w = problem.A * out.x - problem.b;
+    for (std::size_t i = 0; i < problem.parts.size(); ++i)
+      out.regimes[i] = regime_of(problem, problem.parts[i], out);
+    return out;
+  }
+
+ private:
+  contact::ConeSolver solver_;
+  VectorXd last_;  // impulses by row of the product
+};
 
 /// All stay closed, and stick where they do not slide already.
-Regimes all_held(const VectorXd& mu, int block, const std::vector<VectorXd>& slides,
-                 const Holders& holders) {
+Regimes all_held(const FrictionProblem& problem, const std::vector<VectorXd>& slides) {
   Regimes out;
-  out.holders = holders;
-  for (int i = 0; i < mu.size(); ++i) {
-    const bool slides_on = slides[at(i)].size() > 0;
-    out.of.push_back(slides_on || mu[i] == 0 ? Regime::sliding : Regime::sticking);
-    out.directions.push_back(slides_on    ? slides[at(i)]
-                             : mu[i] == 0 ? VectorXd::Zero(block - 1)
-                                          : VectorXd());
-    out.fixed.push_back(slides_on || mu[i] == 0);
+  for (std::size_t i = 0; i < problem.parts.size(); ++i) {
+    const ConePart& p = problem.parts[i];
+    const bool slides_on = !slides.empty() && slides[i].size() > 0;
+    const bool free = p.slips == 0 || (p.mu == 0 && p.bound == 0);
+    out.of.push_back(slides_on || free ? Regime::sliding : Regime::sticking);
+    out.directions.push_back(slides_on ? VectorXd(slides[i].head(p.slips))
+                             : free    ? VectorXd::Zero(p.slips)
+                                       : VectorXd());
+    out.fixed.push_back(slides_on || free);
   }
   return out;
 }
 
-std::vector<int> held_rows(const Regimes& regimes, int block) {
+std::vector<int> held_rows(const FrictionProblem& problem, const Regimes& regimes) {
   std::vector<int> rows;
-  for (int i = 0; i < static_cast<int>(regimes.of.size()); ++i)
-    for (int k = is_held(regimes.holders, i) ? 1 : 0;
-         k < (regimes.of[at(i)] == Regime::sticking ? block : 1); ++k)
-      rows.push_back(block * i + k);
+  for (std::size_t i = 0; i < problem.parts.size(); ++i) {
+    const ConePart& p = problem.parts[i];
+    const int end = regimes.of[i] == Regime::sticking ? p.first + p.rows() : p.slip();
+    for (int row = p.first; row < end; ++row) rows.push_back(row);
+  }
   return rows;
 }
 
@@ -159,247 +153,106 @@ void take(const SharedForces& from, const Regimes& regimes, FrictionAnswer& to) 
 }
 
 /// The shortest forces with the regimes of an answer: what begins to slip goes against its force.
-/// The answer stays where the law has none.
-bool share_as(const std::vector<bool>& open, double no_slip, const MatrixXd& A, const VectorXd& b,
-              const VectorXd& mu, Regimes held, FrictionAnswer& answer) {
-  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
-  for (int k = 0; k < n; ++k) {
-    const VectorXd slip = answer.w.segment(block * k + 1, block - 1);
-    if (open[at(k)]) held.of[at(k)] = Regime::separating;
-    if (held.of[at(k)] != Regime::sticking || slip.norm() <= no_slip) continue;
-    const VectorXd force = answer.x.segment(block * k + 1, block - 1);
-    held.of[at(k)] = Regime::sliding;
-    held.directions[at(k)] = force.norm() > 0 ? VectorXd(-force.normalized()) : slip.normalized();
+/// Keeps contacts closed that are `closed` or do not open. The answer stays where the law has none.
+bool settle(const std::vector<bool>& closed, double none, const FrictionProblem& problem,
+            Regimes held, FrictionAnswer& answer) {
+  for (std::size_t k = 0; k < problem.parts.size(); ++k) {
+    const ConePart& p = problem.parts[k];
+    if (p.has_normal() && answer.regimes[k] == Regime::separating &&
+        (closed.empty() ? answer.w[p.first] > none : !closed[k]))
+      held.of[k] = Regime::separating;
+    const VectorXd slip = p.slip_of(answer.w), force = p.slip_of(answer.x);
+    if (held.of[k] != Regime::sticking || slip.norm() <= none) continue;
+    held.of[k] = Regime::sliding;
+    held.directions[k] = force.norm() > 0 ? VectorXd(-force.normalized()) : slip.normalized();
   }
-  const SharedForces shared = share_forces(A, b, mu, held);
+  const SharedForces shared = share_forces(problem, held);
   if (shared.lawful) take(shared, held, answer);
   return shared.lawful;
 }
 
-/// Keeps contacts closed that are `closed` or do not open, where the law allows it.
-bool settle(const std::vector<bool>& closed, double none, const MatrixXd& A, const VectorXd& b,
-            const VectorXd& mu, const Regimes& held, FrictionAnswer& answer) {
-  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
-  std::vector<bool> open(at(n));
-  for (int k = 0; k < n; ++k)
-    open[at(k)] = answer.regimes[at(k)] == Regime::separating &&
-                  (closed.empty() ? answer.w[block * k] > none : !closed[at(k)]);
-  for (int k = 0; k < n; ++k)
-    if (is_held(held.holders, k)) open[at(k)] = open[at(held.holders[at(k)])];
-  return share_as(open, none, A, b, mu, held, answer);
-}
-
 /// An iteration may end at any of several answers. Compliant contacts share their forces in one
 /// way: from soft to stiff, the first answer whose regimes hold for rigid contacts, too.
-bool solve_compliant(const std::vector<bool>& closed, double none, const MatrixXd& A,
-                     const VectorXd& b, const VectorXd& all, const VectorXd& mu,
-                     const Regimes& held, FrictionAnswer& out) {
-  contact::Options options;
-  options.law = contact::Law::coulomb;
-  options.tolerance = kSolve;
-  options.strict = true;
-  options.max_work = kCompliantWork;
-  ConeBlocks solver(options, held.holders);
+/// `with_slips`: the problem with S.
+bool solve_compliant(const std::vector<bool>& closed, double none, FrictionProblem with_slips,
+                     const FrictionProblem& problem, const Regimes& held, FrictionAnswer& out) {
+  ProductSolver solver(kCompliantWork);
   FrictionAnswer answer;
   for (double part = 1; part >= kStiffest; part *= kStiffer) {
-    MatrixXd compliant = A;
-    compliant.diagonal().array() += part * A.diagonal().mean();
-    const FrictionAnswer found = solver.solve(compliant, b, mu);
+    with_slips.A = problem.A;
+    with_slips.A.diagonal().array() += part * problem.A.diagonal().mean();
+    const FrictionAnswer found = solver.solve(with_slips);
     if (!found.solved) return false;
     if (found.regimes == answer.regimes) continue;
     answer = found;
-    if (!settle(closed, none, A, all, mu, held, answer)) continue;
+    if (!settle(closed, none, problem, held, answer)) continue;
     out = answer;
     return true;
   }
   return false;
 }
 
-AccelerationAnswer solve_contacts(const MatrixXd& A, const VectorXd& free, const VectorXd& mu,
-                                  const Holders& holders, const std::vector<VectorXd>& slides,
-                                  double part, const std::vector<bool>& closed) {
-  const int n = static_cast<int>(mu.size()), block = static_cast<int>(free.size()) / n;
-  AccelerationAnswer out;
-  out.scale = free.cwiseAbs().maxCoeff();
-  out.far = kFarAbove * std::max(out.scale, 1e-12);
-  Regimes regimes = all_held(mu, block, slides, holders);
-  VectorXd b = without_contradictions(A, -free, held_rows(regimes, block), part * out.scale);
-  SharedForces shared = share_forces(A, b, mu, regimes);
+/// All held if the law has any forces for that, else by an iteration, whose answer is settled where
+/// `decides` and forces are shared in several ways.
+FrictionAnswer solve_shared(FrictionProblem& problem, const std::vector<VectorXd>& slides,
+                            double band, double far, const std::vector<bool>& closed,
+                            bool decides) {
+  FrictionAnswer out;
+  Regimes held = all_held(problem, slides);
+  problem.b = without_contradictions(problem.A, problem.b, held_rows(problem, held), band);
+  const SharedForces shared = share_forces(problem, held);
   if (shared.lawful) {
-    take(shared, regimes, out.contacts);
+    take(shared, held, out);
     return out;
   }
-  const VectorXd all = b;
-  for (int k = 0; k < n; ++k)
-    if (slides[at(k)].size() > 0) b.segment(block * k + 1, block - 1) -= out.far * slides[at(k)];
-  const bool decides = shared.several && !closed.empty();
-  const double none = kNoChange * out.scale;
-  if (decides && solve_compliant(closed, none, A, b, all, mu, regimes, out.contacts)) return out;
-  out.contacts = solve_friction(A, b, mu, holders);
-  if (decides && out.contacts.solved) settle(closed, none, A, all, mu, regimes, out.contacts);
+  FrictionProblem with_slips = problem;
+  for (std::size_t k = 0; k < slides.size(); ++k)
+    if (slides[k].size() > 0) {
+      const ConePart& p = problem.parts[k];
+      p.slip_of(with_slips.b) -= far * slides[k].head(p.slips);
+    }
+  decides = decides && shared.several;
+  const double none = kNoChange * problem.b.cwiseAbs().maxCoeff();
+  if (decides && solve_compliant(closed, none, with_slips, problem, held, out)) return out;
+  out = solve_friction(with_slips);
+  if (decides && out.solved) settle(closed, none, problem, held, out);
   return out;
 }
-
-/// Bounded laws among the contacts. One that slides is a force that is known; one that sticks is a
-/// contact whose normal force x_n is given by its own row, a x_n = b_n with the b_n of the
-/// accelerations, and mu x_n the bound. Bounds far above what accelerations ask for would be
-/// another scale of forces: they count by `most` only, unless something slides there.
-struct BoundedLaws {
-  MatrixXd A;
-  VectorXd free, mu;
-  std::vector<VectorXd> slides;
-  std::vector<int> cut;  // bounds that are not whole
-
-  BoundedLaws(const Model& model, ContactRows& rows, const std::vector<VectorXd>& given,
-              double most)
-      : A(rows.A()), free(rows.free_accelerations()), slides(given) {
-    const int block = rows.size(), n = static_cast<int>(given.size());
-    mu.resize(n);
-    const auto is_known = [&](int k) { return rows.is_bounded(k) && given[at(k)].size() > 0; };
-    for (int k = 0; k < n; ++k) {
-      const ContactLaw law = model.law(rows.contacts()[at(k)]);
-      mu[k] = law.friction;
-      if (is_known(k))
-        free -= law.bound * rows.A().middleCols(block * k + 1, block - 1) * given[at(k)];
-    }
-    for (int k = 0; k < n; ++k) {
-      if (!is_known(k)) continue;
-      const int row = block * k + 1;
-      const double own = A(row, row);
-      A.row(row).setZero();
-      A.col(row).setZero();
-      A(row, row) = own;
-      free.segment(block * k, block).setZero();
-      slides[at(k)] = VectorXd();
-      mu[k] = 0;
-    }
-    const double scale = free.cwiseAbs().maxCoeff();
-    for (int k = 0; k < n; ++k) {
-      if (!rows.is_bounded(k) || is_known(k)) continue;
-      const double bound = model.law(rows.contacts()[at(k)]).bound;
-      const double own = A(block * k, block * k), asked = scale > 0 ? scale : bound * own;
-      free[block * k] = -asked;
-      mu[k] = asked > 0 ? bound * own / asked : 1;
-      if (mu[k] <= most) continue;
-      mu[k] = most;
-      cut.push_back(k);
-    }
-  }
-};
 
 }  // namespace
 
-AccelerationAnswer solve_accelerations(const Model& model, ContactRows& rows,
-                                       const std::vector<VectorXd>& slides, double part,
-                                       const std::vector<bool>& closed) {
-  const int block = rows.size(), n = static_cast<int>(rows.contacts().size());
+AccelerationAnswer solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
+                                       double part, const std::vector<bool>& closed) {
+  FrictionProblem problem = rows.problem(-rows.free_accelerations());
+  std::vector<VectorXd> turning = slides;
+  VectorXd known = VectorXd::Zero(problem.b.size());
+  for (std::size_t k = 0; k < slides.size(); ++k) {
+    ConePart& p = problem.parts[k];
+    if (p.normal >= 0 || slides[k].size() == 0) continue;
+    p.slip_of(known) = -p.bound * slides[k].head(p.slips);
+    p.bound = 0;
+    turning[k] = VectorXd();
+  }
+  problem.b -= problem.A * known;
   AccelerationAnswer out;
-  const auto any = [&](const auto& is) {
-    for (int k = 0; k < n; ++k)
-      if (is(k)) return true;
-    return false;
-  };
-  if (!any([&](int k) { return rows.is_bounded(k); })) {
-    VectorXd mu(n);
-    for (int k = 0; k < n; ++k) mu[k] = model.law(rows.contacts()[at(k)]).friction;
-    return solve_contacts(rows.A(), rows.free_accelerations(), mu, rows.holders(), slides, part,
-                          closed);
-  }
-  for (double most = kCutBound; most <= kMostBound; most *= kCutBound) {
-    const BoundedLaws laws(model, rows, slides, most);
-    out = solve_contacts(laws.A, laws.free, laws.mu, rows.holders(), laws.slides, part, closed);
-    const auto slides_there = [&](int k) {
-      return out.contacts.solved && out.contacts.regimes[at(k)] != Regime::sticking;
-    };
-    if (std::none_of(laws.cut.begin(), laws.cut.end(), slides_there)) break;
-  }
+  out.scale = problem.b.cwiseAbs().maxCoeff();
+  out.contacts = solve_shared(problem, turning, part * out.scale,
+                              kFarAbove * std::max(out.scale, 1e-12), closed, !closed.empty());
   if (!out.contacts.solved) return out;
-  // Their own normals are nobody's, and what slides has its force and acceleration.
-  VectorXd& x = out.contacts.x;
-  for (int k = 0; k < n; ++k) {
-    if (!rows.is_bounded(k)) continue;
-    const bool slid = slides[at(k)].size() > 0;
-    if (slid) {
-      x.segment(block * k + 1, block - 1) =
-          -model.law(rows.contacts()[at(k)]).bound * slides[at(k)];
-      out.contacts.regimes[at(k)] = Regime::sliding;
-    }
-    x[block * k] = 0;
-  }
-  const VectorXd w = rows.A() * x + rows.free_accelerations();
-  for (int k = 0; k < n; ++k)
-    if (rows.is_bounded(k)) out.contacts.w.segment(block * k, block) = w.segment(block * k, block);
+  out.contacts.x += known;
+  for (std::size_t k = 0; k < slides.size(); ++k)
+    if (turning[k].size() < slides[k].size()) out.contacts.regimes[k] = Regime::sliding;
   return out;
 }
 
-FrictionAnswer solve_impact(const MatrixXd& A, const VectorXd& given, const VectorXd& mu,
-                            double band, const Holders& holders) {
-  const int n = static_cast<int>(mu.size()), block = static_cast<int>(given.size()) / n;
-  if (!A.allFinite() || !given.allFinite()) return solve_friction(A, given, mu, holders);
-  Regimes regimes = all_held(mu, block, std::vector<VectorXd>(at(n)), holders);
-  const VectorXd b = without_contradictions(A, given, held_rows(regimes, block), band);
-  FrictionAnswer out;
-  const SharedForces shared = share_forces(A, b, mu, regimes);
-  if (shared.lawful) {
-    take(shared, regimes, out);
-    return out;
-  }
-  const double none = kNoChange * b.cwiseAbs().maxCoeff();
-  if (shared.several && solve_compliant({}, none, A, b, b, mu, regimes, out)) return out;
-  out = solve_friction(A, b, mu, holders);
-  if (shared.several && out.solved) settle({}, none, A, b, mu, regimes, out);
-  return out;
+FrictionAnswer solve_impact(FrictionProblem problem, double band) {
+  if (!problem.A.allFinite() || !problem.b.allFinite()) return solve_friction(problem);
+  return solve_shared(problem, {}, band, 0, {}, true);
 }
 
-FrictionAnswer solve_friction(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
-                              const Holders& holders) {
-  const int n = static_cast<int>(mu.size());
-  const int block = static_cast<int>(b.size()) / n;
-  FrictionAnswer out;
-  out.x.setZero(b.size());
-  out.w = -b;
-  out.regimes.assign(static_cast<std::size_t>(n), Regime::separating);
-  if (!A.allFinite() || !b.allFinite()) {  // the motion has left the range of numbers
-    out.error = std::numeric_limits<double>::infinity();
-    return out;
-  }
-  double largest = 0;
-  for (int i = 0; i < n; ++i)
-    if (!is_held(holders, i)) largest = std::max(largest, A(block * i, block * i));
-  std::vector<int> free, place(at(n), -1);
-  Holders held;
-  for (int i = 0; i < n; ++i) {
-    const int by = is_held(holders, i) ? place[at(holders[at(i)])] : -1;
-    const int of = is_held(holders, i) ? holders[at(i)] : i;
-    if (!(A(block * of, block * of) > kLocked * largest)) continue;
-    place[at(i)] = static_cast<int>(free.size());
-    free.push_back(i);
-    held.push_back(by);
-  }
-  if (holders.empty()) held.clear();
-  if (free.empty()) {
-    out.solved = true;
-    return out;
-  }
-  std::vector<int> rows;
-  VectorXd friction(free.size());
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    friction[static_cast<Eigen::Index>(i)] = mu[free[i]];
-    for (int k = 0; k < block; ++k) rows.push_back(block * free[i] + k);
-  }
-  const SomeRows part(A, b, rows);
-  contact::Options options;
-  options.law = contact::Law::coulomb;
-  options.tolerance = kSolve;
-  options.strict = true;
-  FrictionAnswer inner = ConeBlocks(options, held).solve(part.A, part.b, friction);
-  if (inner.solved) sharpen(part.A, part.b, friction, held, inner);
-  out.solved = inner.solved;
-  out.error = inner.error;
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    out.x[rows[r]] = inner.x[static_cast<Eigen::Index>(r)];
-  for (std::size_t i = 0; i < free.size(); ++i) out.regimes[at(free[i])] = inner.regimes[i];
-  out.w = A * out.x - b;
+FrictionAnswer solve_friction(const FrictionProblem& problem) {
+  FrictionAnswer out = ProductSolver().solve(problem);
+  if (out.solved) sharpen(problem, out);
   return out;
 }
 

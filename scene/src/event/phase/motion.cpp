@@ -9,15 +9,11 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kRank = 1e-10;  // of the rows of joints
 constexpr double kWeakened = 0.3;
 constexpr double kAhead = 1e-5;                         // s in the units of the model
-constexpr double kLawful = 1e-9;                        // of the largest force
 constexpr double kHeld = 1e-9;                          // of the accelerations
 constexpr double kFactorisation = 4, kLookWork = 1000;  // operations
 constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
-
-constexpr double kDependentRows = 1e-10;  // of rows of unit length
 
 }  // namespace
 
@@ -301,7 +297,7 @@ VectorXd Motion::joint_forces() {
   VectorXd load = VectorXd::Zero(nu_);
   for (int k = 0; k < joints_; ++k)
     load += lambda_[k] * joint_W_.row(joints_in_use_[index(k)]).transpose();
-  linalg::LeastSquares factor(kRank);
+  linalg::LeastSquares factor(kDependentRow);
   factor.factor(joint_W_.transpose());
   return factor.solve(load);
 }
@@ -322,7 +318,7 @@ bool Motion::forces_are_lawful() const {
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int contact = static_cast<int>(k);
     const double normal = normal_force(contact), mu = model_.law(closed_[k]).friction;
-    if (!(normal >= 0 && friction_force(contact).norm() <= mu * normal * (1 + kLawful)))
+    if (!(normal >= 0 && friction_force(contact).norm() <= mu * normal * (1 + kNoForce)))
       return false;
   }
   const VectorXd left = row_scale_.cwiseProduct(R_ * a_ + r_);
@@ -342,21 +338,18 @@ std::vector<VectorXd> Motion::contact_forces() {
     largest = std::max(largest, force.norm());
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const double least = -kLawful * largest, mu = model_.law(closed_[k]).friction;
+    const double least = -kNoForce * largest, mu = model_.law(closed_[k]).friction;
     lawful =
         lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(tangents_).norm() >= least;
   }
   if (lawful || !hyperstatic_) return out;
   ContactRows rows(model_, closed_);
-  const AccelerationAnswer answer =
-      solve_accelerations(model_, rows, slides(), bands_.of_accelerations());
+  const AccelerationAnswer answer = solve_accelerations(rows, slides(), bands_.of_accelerations());
   if (!answer.contacts.solved) return out;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const auto x = answer.contacts.x.segment(rows.size() * static_cast<int>(k), rows.size());
-    if (normals_of(k) == 0)
-      out[k].tail(tangents_) = x.tail(tangents_);
-    else
-      out[k] = x;
+    const VectorXd force = rows.of(static_cast<int>(k), answer.contacts.x);
+    const int from = 1 - normals_of(k);  // of the others the normal force is known
+    out[k].tail(1 + tangents_ - from) = force.tail(1 + tangents_ - from);
   }
   return out;
 }
@@ -418,7 +411,7 @@ void Motion::settle_velocities(double t, VectorXd& y) {
   MatrixXd columns = R_.transpose() * row_scale_.asDiagonal();
   const MatrixXd rows = columns.transpose();
   model_.divide_by_mass(columns);
-  linalg::LeastSquares factor(kDependentRows);
+  linalg::LeastSquares factor(kDependentRow);
   factor.factor(MatrixXd(rows * columns));
   const VectorXd forces = factor.solve(row_scale_.cwiseProduct(rates));
   y.segment(nq_, nu_) -= columns * forces;

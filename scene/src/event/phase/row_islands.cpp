@@ -7,8 +7,6 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kIslandRank = 1e-10;  // of rows of unit length
-
 using linalg::at;
 
 }  // namespace
@@ -33,7 +31,7 @@ void RowIslands::choose(const MatrixXd& R, const MatrixXd& C, int block) {
     int& k = island_of[at(sets.root(first[at(i)]))];
     if (k < 0) {
       k = static_cast<int>(islands_.size());
-      islands_.push_back({{}, {}, linalg::LeastSquares(kIslandRank)});
+      islands_.push_back({{}, {}, linalg::LeastSquares(kDependentRow)});
     }
     islands_[at(k)].rows.push_back(i);
   }

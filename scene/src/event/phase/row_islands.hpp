@@ -10,8 +10,8 @@
 
 namespace tether::scene::event {
 
-constexpr double kIndependentRow = 1e-6;
-constexpr double kClearlyMoreRow = 1.1;  // else the earlier one is taken
+constexpr double kIndependentRow = 1e-6, kDependentRow = 1e-10;  // of rows of unit length
+constexpr double kClearlyMoreRow = 1.1;                          // else the earlier one is taken
 
 /// Rows that the earlier ones do not imply, in the metric of the masses; Gram and Schmidt, twice.
 class IndependentRows {

@@ -14,10 +14,7 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSameForces = 1e-11;
 constexpr double kContradicts = 1e-10;  // of b
-constexpr double kOutOfCone = 1e-9;     // of the largest force
-constexpr double kNoSlip = 3e-9;        // of b: no velocity or acceleration
 constexpr double kFollow = 0.99;
 constexpr int kConeSteps = 1000;
 constexpr int kTurns = 50;
@@ -26,36 +23,40 @@ constexpr int kSharpenings = 30;
 constexpr double kTurnedByRounding = 1e-15;
 constexpr double kSame = 1e-7;  // of the answer's size: the exact one against the library's
 
-/// The closed contacts' unknowns: x_n where it is their own, and x_t where it sticks.
+/// The unknowns of what is closed: normal forces, and forces of slips that stick.
 class HeldRows {
+  const ConePart& part(int i) const { return problem_.parts[at(i)]; }
+  /// Those of a part that sticks, among the unknowns.
+  template <class Vector>
+  auto slip_force(int i, Vector& x) const {
+    const ConePart& p = part(i);
+    return x.segment(p.slips > 0 ? place_[at(p.slip())] : 0, p.slips);
+  }
+
  public:
-  HeldRows(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Regimes& regimes)
-      : A_(A), b_(b), mu_(mu), block_(static_cast<int>(b.size() / mu.size())), regimes_(regimes) {
-    for (int i = 0; i < mu.size(); ++i) {
-      if (regimes.of[at(i)] == Regime::separating) continue;
-      const bool held = is_held(regimes.holders, i);
-      const int by = held ? place_of(regimes.holders[at(i)]) : -1;
-      if (held && by < 0) continue;
-      const int first = static_cast<int>(rows_.size());
-      contacts_.push_back(i);
-      normal_.push_back(held ? normal_[at(by)] : first);
-      tangents_.push_back(held ? first : first + 1);
-      for (int k = held ? 1 : 0; k < (regimes.of[at(i)] == Regime::sticking ? block_ : 1); ++k)
-        rows_.push_back(block_ * i + k);
+  HeldRows(const FrictionProblem& problem, const Regimes& regimes)
+      : problem_(problem),
+        regimes_(regimes),
+        place_(at(static_cast<int>(problem.b.size())), -1),
+        known_(VectorXd::Zero(problem.b.size())) {
+    for (int i = 0; i < static_cast<int>(problem.parts.size()); ++i) {
+      const ConePart& p = part(i);
+      const bool open = p.is_held() && place_[at(p.normal)] < 0;
+      if (open || regimes.of[at(i)] == Regime::separating) continue;
+      closed_.push_back(i);
+      if (p.has_normal()) take(p.first);
+      for (int k = 0; k < p.slips && !slides(i); ++k) take(p.slip() + k);
+      if (slides(i) && p.normal < 0) p.slip_of(known_) = -p.bound * regimes.directions[at(i)];
     }
-    const int m = static_cast<int>(rows_.size());
-    right_.resize(m);
-    S_.resize(m, m);
-    VectorXd column;
-    for (int c = 0; c < m; ++c) {
-      const int row = rows_[at(c)], i = row / block_;
-      right_[c] = b[row];
-      column = A.col(row);
-      if (row % block_ == 0)
-        for (const int k : with_normal_of(i))
-          if (slides(k))
-            column -= mu[k] * A.middleCols(block_ * k + 1, block_ - 1) * regimes.directions[at(k)];
-      for (int r = 0; r < m; ++r) S_(r, c) = column[rows_[at(r)]];
+    const SomeRows rows(problem.A, problem.b - problem.A * known_, rows_);
+    right_ = rows.b;
+    S_ = rows.A;
+    for (const int i : closed_) {
+      const ConePart& p = part(i);
+      if (!slides(i) || p.normal < 0) continue;
+      const VectorXd column = problem.A.middleCols(p.slip(), p.slips) * regimes.directions[at(i)];
+      const int c = place_[at(p.normal)];
+      for (int r = 0; r < S_.rows(); ++r) S_(r, c) -= p.mu * column[rows_[at(r)]];
     }
   }
 
@@ -65,23 +66,24 @@ class HeldRows {
   /// False: nothing holds all rows.
   bool solve() {
     if (empty()) return false;
-    linalg::LeastSquares factor(kSameForces);
+    linalg::LeastSquares factor(kDependent);
     factor.factor(S_);
     x_ = factor.solve(right_);
-    return (S_ * x_ - right_).cwiseAbs().maxCoeff() <= kContradicts * b_.cwiseAbs().maxCoeff();
+    const double largest = problem_.b.cwiseAbs().maxCoeff();
+    return (S_ * x_ - right_).cwiseAbs().maxCoeff() <= kContradicts * largest;
   }
 
   /// Whether other forces hold the rows as well.
   void look_for_others() {
     if (empty()) return;
-    linalg::PivotedQr of_rows(kSameForces);
+    linalg::PivotedQr of_rows(kDependent);
     of_rows.factor(S_.transpose());
     free_ = of_rows.left_null_space();
   }
 
   /// They act against what closes the contacts: else contacts that could open as well press
-  /// themselves together (Painleve). What no other row moves and that moves none, such as the
-  /// normal of a bounded law, says nothing of them.
+  /// themselves together (Painleve). What no other row moves and that moves none says nothing of
+  /// them.
   bool resists() const {
     double sum = 0;
     for (Eigen::Index r = 0; r < x_.size(); ++r)
@@ -91,13 +93,10 @@ class HeldRows {
   }
 
   bool is_lawful(const VectorXd& x) const {
-    const double least = -kOutOfCone * x.cwiseAbs().maxCoeff();
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const int i = contacts_[k];
-      const double normal = x[normal_[k]];
-      if (normal < least) return false;
-      if (!slides(i) && mu_[i] * normal - x.segment(tangents_[k], block_ - 1).norm() < least)
-        return false;
+    const double least = -kNoForce * x.cwiseAbs().maxCoeff();
+    for (const int i : closed_) {
+      if (part(i).has_normal() && x[place_[at(part(i).first)]] < least) return false;
+      if (!slides(i) && limit(i, x) - slip_force(i, x).norm() < least) return false;
     }
     return true;
   }
@@ -106,20 +105,19 @@ class HeldRows {
   /// is that of any z.
   bool move_into_cones() {
     if (!find_in_cones()) return false;
-    for (const int normal : normal_) x_[normal] = std::max(0.0, x_[normal]);
+    for (const int i : closed_)
+      if (part(i).has_normal()) {
+        double& normal = x_[place_[at(part(i).first)]];
+        normal = std::max(0.0, normal);
+      }
     return true;
   }
   VectorXd forces() const {
-    VectorXd x = VectorXd::Zero(b_.size());
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      const int i = contacts_[k];
-      const double normal = x_[normal_[k]];
-      if (!is_held(regimes_.holders, i)) x[block_ * i] = normal;
-      if (slides(i))
-        x.segment(block_ * i + 1, block_ - 1) = -mu_[i] * normal * regimes_.directions[at(i)];
-      else
-        x.segment(block_ * i + 1, block_ - 1) = x_.segment(tangents_[k], block_ - 1);
-    }
+    VectorXd x = known_;
+    for (std::size_t r = 0; r < rows_.size(); ++r) x[rows_[r]] = x_[static_cast<Eigen::Index>(r)];
+    for (const int i : closed_)
+      if (slides(i) && part(i).normal >= 0)
+        part(i).slip_of(x) = -part(i).mu * x[part(i).normal] * regimes_.directions[at(i)];
     return x;
   }
 
@@ -141,86 +139,94 @@ class HeldRows {
     return false;
   }
 
-  /// The nearest point of the cones: those of one normal that its tangents are out of raise it.
+  /// The nearest point of the cones: those of one normal that its slips are out of raise it.
   void project(VectorXd& x) const {
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      if (is_held(regimes_.holders, contacts_[k])) continue;
-      double& normal = x[normal_[k]];
-      std::vector<std::size_t> out;
-      for (const int i : with_normal_of(contacts_[k]))
-        if (const int place = place_of(i); place >= 0 && !slides(i)) out.push_back(at(place));
-      const auto length = [&](std::size_t j) { return x.segment(tangents_[j], block_ - 1).norm(); };
-      double on = normal;
-      for (std::size_t count = out.size() + 1; out.size() < count;) {
-        count = out.size();
-        out.erase(
-            std::remove_if(out.begin(), out.end(),
-                           [&](std::size_t j) { return length(j) <= mu_[contacts_[j]] * on; }),
-            out.end());
-        double sum = normal, weight = 1;
-        for (const std::size_t j : out) {
-          const double mu = mu_[contacts_[j]];
-          sum += mu * length(j);
-          weight += mu * mu;
-        }
-        on = std::max(0.0, sum / weight);
-      }
-      normal = on;
-      for (const std::size_t j : out) {
-        const double all = length(j);
-        x.segment(tangents_[j], block_ - 1) *= all > 0 ? mu_[contacts_[j]] * on / all : 0;
+    for (const int i : closed_) {
+      const ConePart& p = part(i);
+      if (p.is_held()) continue;
+      std::vector<int> out;
+      for (const int k : closed_)
+        if (!slides(k) && (k == i || (p.has_normal() && part(k).normal == p.normal)))
+          out.push_back(k);
+      double on = p.has_normal() ? x[place_[at(p.first)]] : p.bound;
+      if (p.has_normal()) x[place_[at(p.first)]] = on = raised(x, on, out);
+      for (const int k : out) {
+        auto force = slip_force(k, x);
+        const double length = force.norm(), most = p.has_normal() ? part(k).mu * on : on;
+        if (length > most) force *= most / length;
       }
     }
   }
-  bool slides(int i) const { return regimes_.of[at(i)] == Regime::sliding; }
-  /// Place of a contact among the closed ones; -1: it is open.
-  int place_of(int i) const {
-    const auto found = std::lower_bound(contacts_.begin(), contacts_.end(), i);
-    return found != contacts_.end() && *found == i ? static_cast<int>(found - contacts_.begin())
-                                                   : -1;
-  }
-  /// The contact and those that it holds.
-  std::vector<int> with_normal_of(int i) const {
-    std::vector<int> out = {i};
-    for (int k = 0; k < static_cast<int>(regimes_.holders.size()); ++k)
-      if (regimes_.holders[at(k)] == i) out.push_back(k);
-    return out;
+  /// A normal force that those of `out` raise which exceed their share of it.
+  double raised(const VectorXd& x, double normal, std::vector<int> out) const {
+    double on = normal;
+    for (std::size_t count = out.size() + 1; out.size() < count;) {
+      count = out.size();
+      out.erase(std::remove_if(out.begin(), out.end(),
+                               [&](int k) { return slip_force(k, x).norm() <= part(k).mu * on; }),
+                out.end());
+      double sum = normal, weight = 1;
+      for (const int k : out) {
+        sum += part(k).mu * slip_force(k, x).norm();
+        weight += part(k).mu * part(k).mu;
+      }
+      on = std::max(0.0, sum / weight);
+    }
+    return on;
   }
 
-  const MatrixXd& A_;
-  const VectorXd& b_;
-  const VectorXd& mu_;
-  int block_;
+  bool slides(int i) const { return regimes_.of[at(i)] == Regime::sliding; }
+  void take(int row) {
+    place_[at(row)] = static_cast<int>(rows_.size());
+    rows_.push_back(row);
+  }
+  double limit(int i, const VectorXd& x) const {
+    const ConePart& p = part(i);
+    return p.normal < 0 ? p.bound : p.mu * x[place_[at(p.normal)]];
+  }
+
+  const FrictionProblem& problem_;
   const Regimes& regimes_;
-  std::vector<int> contacts_, normal_, tangents_, rows_;  // places of unknowns
+  std::vector<int> closed_, rows_, place_;  // parts; rows of the unknowns; place of each row
   MatrixXd S_, free_;
-  VectorXd right_, x_;
+  VectorXd known_, right_, x_;
 };
 
 /// Directions of slip turn towards those of w: where they hardly slip, w turns by what the friction
 /// moves. Returns how far w is from them.
-double turn(const MatrixXd& A, const SharedForces& now, Regimes& regimes) {
-  const int n = static_cast<int>(regimes.of.size()), block = static_cast<int>(now.x.size()) / n;
-  std::vector<int> turning;
-  for (int i = 0; i < n; ++i)
-    if (regimes.of[at(i)] == Regime::sliding && !regimes.fixed[at(i)]) turning.push_back(i);
+double turn(const FrictionProblem& problem, const SharedForces& now, Regimes& regimes) {
+  std::vector<std::size_t> turning;
+  for (std::size_t i = 0; i < regimes.of.size(); ++i)
+    if (regimes.of[i] == Regime::sliding && !regimes.fixed[i]) turning.push_back(i);
   double largest = 0;
-  for (const int i : turning) {
-    VectorXd& d = regimes.directions[at(i)];
-    const VectorXd slip = now.w.segment(block * i + 1, block - 1);
+  for (const std::size_t i : turning) {
+    const ConePart& p = problem.parts[i];
+    VectorXd& d = regimes.directions[i];
+    const VectorXd slip = p.slip_of(now.w);
     const double along = slip.dot(d);
     const VectorXd across = slip - along * d;
     largest = std::max({largest, across.norm(), -along});
     double moves = std::abs(along);
-    for (const int k : turning)
-      moves += A.block(block * i + 1, block * k + 1, block - 1, block - 1).norm() *
-               now.x.segment(block * k + 1, block - 1).norm();
+    for (const std::size_t k : turning) {
+      const ConePart& q = problem.parts[k];
+      moves +=
+          problem.A.block(p.slip(), q.slip(), p.slips, q.slips).norm() * q.slip_of(now.x).norm();
+    }
     if (moves > 0) d = (d + across / moves).normalized();
   }
   return largest;
 }
 
 }  // namespace
+
+FrictionProblem FrictionProblem::of_contacts(const MatrixXd& A, const VectorXd& b,
+                                             const VectorXd& mu) {
+  FrictionProblem out{A, b, {}};
+  const int block = static_cast<int>(b.size() / mu.size());
+  for (int i = 0; i < static_cast<int>(mu.size()); ++i)
+    out.parts.push_back({block * i, block - 1, block * i, mu[i]});
+  return out;
+}
 
 SomeRows::SomeRows(const MatrixXd& whole, const VectorXd& right, const std::vector<int>& rows)
     : A(rows.size(), rows.size()), b(rows.size()) {
@@ -233,79 +239,76 @@ SomeRows::SomeRows(const MatrixXd& whole, const VectorXd& right, const std::vect
 
 VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
                                 double band) {
-  const int m = static_cast<int>(rows.size());
+  if (rows.empty()) return b;
   const SomeRows part(A, b, rows);
-  linalg::PivotedQr factor(kSameForces);
+  linalg::PivotedQr factor(kDependent);
   factor.factor(part.A);
   const MatrixXd none = factor.left_null_space();
   const VectorXd against = none * (none.transpose() * part.b);
   VectorXd out = b;
-  if (m > 0 && against.cwiseAbs().maxCoeff() <= band)
-    for (int r = 0; r < m; ++r) out[rows[at(r)]] -= against[r];
+  if (against.cwiseAbs().maxCoeff() <= band)
+    for (int r = 0; r < against.size(); ++r) out[rows[at(r)]] -= against[r];
   return out;
 }
 
-SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
-                          Regimes& regimes) {
-  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
-  const double none = kNoSlip * b.cwiseAbs().maxCoeff();
+SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes) {
+  const double none = kNoChange * problem.b.cwiseAbs().maxCoeff();
   SharedForces out;
   double off = 0, before = 0;
   for (int pass = 0; pass < kTurns; ++pass) {
-    HeldRows rows(A, b, mu, regimes);
+    HeldRows rows(problem, regimes);
     const bool held = rows.solve();
     rows.look_for_others();
     out.several = rows.several();
     if (!held || !out.several || !rows.resists() || !rows.move_into_cones()) return out;
     out.x = rows.forces();
-    out.w = A * out.x - b;
+    out.w = problem.A * out.x - problem.b;
     const Regimes now = regimes;
     before = off;
-    off = turn(A, out, regimes);
+    off = turn(problem, out, regimes);
     if (off == 0 || (pass > 0 && off <= none && off >= kSettles * before)) {
       regimes = now;
       break;
     }
   }
   out.lawful = off <= none;
-  for (int i = 0; i < n; ++i) out.lawful = out.lawful && out.w[block * i] >= -none;
+  for (const ConePart& p : problem.parts)
+    if (p.has_normal()) out.lawful = out.lawful && out.w[p.first] >= -none;
   return out;
 }
 
-void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Holders& holders,
-             FrictionAnswer& answer) {
-  const int n = static_cast<int>(mu.size()), block = static_cast<int>(b.size()) / n;
-  Regimes regimes{answer.regimes, std::vector<VectorXd>(at(n)), {}, holders};
-  const auto slides = [&](int i) { return regimes.of[at(i)] == Regime::sliding; };
-  for (int i = 0; i < n; ++i) {
+void sharpen(const FrictionProblem& problem, FrictionAnswer& answer) {
+  const std::size_t n = problem.parts.size();
+  Regimes regimes{answer.regimes, std::vector<VectorXd>(n), {}};
+  const auto slides = [&](std::size_t i) { return regimes.of[i] == Regime::sliding; };
+  for (std::size_t i = 0; i < n; ++i) {
     if (!slides(i)) continue;
-    const VectorXd wt = answer.w.segment(block * i + 1, block - 1);
-    regimes.directions[at(i)] = wt.norm() > 0
-                                    ? wt.normalized()
-                                    : (-answer.x.segment(block * i + 1, block - 1)).normalized();
+    const VectorXd slip = problem.parts[i].slip_of(answer.w);
+    regimes.directions[i] = slip.norm() > 0
+                                ? slip.normalized()
+                                : VectorXd(-problem.parts[i].slip_of(answer.x)).normalized();
   }
   VectorXd x, w;
   for (int pass = 0; pass < kSharpenings; ++pass) {
-    HeldRows rows(A, b, mu, regimes);
+    HeldRows rows(problem, regimes);
     rows.solve();
-    x = rows.empty() ? VectorXd::Zero(b.size()) : rows.forces();
-    w = A * x - b;
+    x = rows.forces();
+    w = problem.A * x - problem.b;
     double turned = 0;
-    for (int i = 0; i < n; ++i) {
-      const VectorXd wt = w.segment(block * i + 1, block - 1);
-      if (!slides(i) || !(wt.norm() > 0)) continue;
-      turned = std::max(turned, (wt.normalized() - regimes.directions[at(i)]).norm());
-      regimes.directions[at(i)] = wt.normalized();
+    for (std::size_t i = 0; i < n; ++i) {
+      const VectorXd slip = problem.parts[i].slip_of(w);
+      if (!slides(i) || !(slip.norm() > 0)) continue;
+      turned = std::max(turned, (slip.normalized() - regimes.directions[i]).norm());
+      regimes.directions[i] = slip.normalized();
     }
     if (turned < kTurnedByRounding) break;
     if (turned > 1) return;  // it does not settle: the library's answer stands
   }
   // Still an answer of the law?
-  const double force = answer.x.cwiseAbs().maxCoeff(), speed = b.cwiseAbs().maxCoeff();
-  for (int i = 0; i < n; ++i) {
-    const double xn = x[block * (is_held(holders, i) ? holders[at(i)] : i)], wn = w[block * i];
-    if (xn < -kSame * force || wn < -kSame * speed) return;
-    if (x.segment(block * i + 1, block - 1).norm() > mu[i] * xn + kSame * force) return;
+  const double force = answer.x.cwiseAbs().maxCoeff(), speed = problem.b.cwiseAbs().maxCoeff();
+  for (const ConePart& p : problem.parts) {
+    if (p.has_normal() && x[p.first] < -kSame * force) return;
+    if (p.slip_of(x).norm() > p.limit(x) + kSame * force) return;
   }
   if ((w - answer.w).cwiseAbs().maxCoeff() > kSame * (speed + 1e-300)) return;
   answer.x = x;

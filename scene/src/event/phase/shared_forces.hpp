@@ -14,13 +14,37 @@ namespace tether::scene::event {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// For each contact of a problem, the contact whose normal force bounds it, as in |moment| <=
-/// r x_n. Such a contact has tangents only, its x_n is zero, and it comes after its holder. -1: it
-/// has its own normal force. Empty: all have.
-using Holders = std::vector<int>;
-inline bool is_held(const Holders& holders, int contact) {
-  return !holders.empty() && holders[static_cast<std::size_t>(contact)] >= 0;
-}
+constexpr double kDependent = 1e-11;     // of rows: they depend on others
+constexpr double kHeldByJoints = 1e-10;  // of a mobility without joints
+constexpr double kNoForce = 1e-9;        // of the largest force
+constexpr double kNoChange = 3e-9;       // of the largest acceleration or velocity
+
+/// One contact in a product of cones, by its rows of w = A x - b: its normal, if it has one, and
+/// then its slip. |slip force| <= mu x_n + bound, x_n its own normal force or that of the contact
+/// that holds it, which comes before it.
+struct ConePart {
+  int first = 0, slips = 0;
+  int normal = -1;  ///< the row of x_n; -1: there is none
+  double mu = 0, bound = 0;
+
+  bool has_normal() const { return normal == first; }
+  bool is_held() const { return normal >= 0 && normal != first; }
+  int slip() const { return has_normal() ? first + 1 : first; }
+  int rows() const { return slips + (has_normal() ? 1 : 0); }
+  double limit(const VectorXd& x) const { return normal < 0 ? bound : mu * x[normal] + bound; }
+  auto slip_of(const VectorXd& x) const { return x.segment(slip(), slips); }
+  auto slip_of(VectorXd& x) const { return x.segment(slip(), slips); }
+};
+
+/// w = A x - b over a product of cones.
+struct FrictionProblem {
+  MatrixXd A;
+  VectorXd b;
+  std::vector<ConePart> parts;
+
+  /// Contacts in one block after the other, of a normal and as many tangents each.
+  static FrictionProblem of_contacts(const MatrixXd& A, const VectorXd& b, const VectorXd& mu);
+};
 
 /// These rows of w = A x - b, and these columns of A.
 struct SomeRows {
@@ -29,12 +53,11 @@ struct SomeRows {
   VectorXd b;
 };
 
-/// Regimes of a problem w = A x - b. Where a contact slides: x_t = -mu x_n d.
+/// Regimes of a problem, by part. What slides has the force -limit d.
 struct Regimes {
   std::vector<contact::Regime> of;
   std::vector<VectorXd> directions;  ///< d; empty where it does not slide
-  std::vector<bool> fixed;           ///< d stays; else it is that of w_t
-  Holders holders;
+  std::vector<bool> fixed;           ///< d stays; else it is that of the slip
 };
 
 struct SharedForces {
@@ -43,12 +66,11 @@ struct SharedForces {
   VectorXd x, w;
 };
 
-/// w_n = 0 where contacts are closed, w_t = 0 where they stick. Directions that are not fixed turn
-/// to those of w.
-SharedForces share_forces(const MatrixXd& A, const VectorXd& b, const VectorXd& mu,
-                          Regimes& regimes);
+/// No normal velocity where contacts are closed, no slip where they stick. Directions that are not
+/// fixed turn to those of w.
+SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes);
 
-/// Answer of a frictional problem w = A x - b.
+/// Answer of a frictional problem.
 struct FrictionAnswer {
   bool solved = false;
   VectorXd x, w;
@@ -57,13 +79,12 @@ struct FrictionAnswer {
 };
 
 /// The same regimes without the error of an iteration, where that is an answer of the law, too:
-/// stuck rows vanish, and where a contact slides x_t = -mu x_n d, d the direction of w_t.
-void sharpen(const MatrixXd& A, const VectorXd& b, const VectorXd& mu, const Holders& holders,
-             FrictionAnswer& answer);
+/// stuck rows vanish, and what slides is opposed by its limit.
+void sharpen(const FrictionProblem& problem, FrictionAnswer& answer);
 
-/// b of w = A x - b without what no x can do in these rows, which depend on each other, where that
-/// is at most `band`: the error of a state makes them contradict each other, and an answer that
-/// holds all of them would not exist.
+/// b without what no x can do in these rows, which depend on each other, where that is at most
+/// `band`: the error of a state makes them contradict each other, and an answer that holds all of
+/// them would not exist.
 VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
                                 double band);
 

@@ -155,19 +155,16 @@ double Watcher::of_state(Function& f) {
 double Watcher::support() {
   if (motion_.forces_are_lawful()) return support_band_ > 0 ? support_band_ : kNoise;
   ContactRows rows(motion_.model(), motion_.closed());
-  const int block = rows.size();
   const std::vector<VectorXd> slides = motion_.slides();
   const bool sliding = std::any_of(slides.begin(), slides.end(),
                                    [](const VectorXd& each) { return each.size() > 0; });
-  const AccelerationAnswer answer =
-      solve_accelerations(motion_.model(), rows, slides, bands().of_accelerations());
+  const AccelerationAnswer answer = solve_accelerations(rows, slides, bands().of_accelerations());
   if (!answer.contacts.solved) return -answer.scale;
   double largest = 0;
   for (std::size_t k = 0; k < slides.size(); ++k) {
-    const int row = block * static_cast<int>(k);
-    largest = std::max(largest, std::abs(answer.contacts.w[row]));
-    if (slides[k].size() == 0)
-      largest = std::max(largest, answer.contacts.w.segment(row + 1, block - 1).norm());
+    const ConePart& p = rows.parts()[k];
+    if (p.has_normal()) largest = std::max(largest, std::abs(answer.contacts.w[p.first]));
+    if (slides[k].size() == 0) largest = std::max(largest, p.slip_of(answer.contacts.w).norm());
   }
   const double noise = std::max(sliding ? kSlidingNoise : kNoise, 100 * answer.contacts.error);
   support_band_ = std::max(bands().of_accelerations(), noise) * answer.scale;
