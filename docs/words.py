@@ -129,7 +129,8 @@ def check_source(path, replaced):
                 if len(sentence.split()) > LONGEST_SENTENCE:
                     yield f"{path}:{line}: a sentence of {len(sentence.split())} words: {sentence[:60]}..."
     room = path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else ""
-    for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
+    lines = path.read_text(errors="replace").splitlines()
+    for number, line in enumerate(lines, 1):
         if COMMENT.match(line):
             yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
         remark = REMARK.search(line)
@@ -138,7 +139,9 @@ def check_source(path, replaced):
         for phrase, instead in replaced:
             if re.search(rf"\b{re.escape(phrase)}\b", remark.group(), re.I):
                 yield f"{path}:{number}: say \"{instead}\", not \"{phrase}\""
-        for place, kind, numbers in REFERENCE.findall(remark.group()) if room in PAPERS else ():
+        more = re.match(r"\s*//+ (.*)", lines[number]) if remark.group().endswith(",") and number < len(lines) else None
+        cited = remark.group() + (" " + more.group(1) if more else "")
+        for place, kind, numbers in REFERENCE.findall(cited) if room in PAPERS else ():
             named = PAPERS[room] if place == "method" else place
             for which in set(numbers.split(", ")) - paper(named)[kind]:
                 yield f"{path}:{number}: docs/method/{named}.md has no {kind} {which}"
