@@ -23,6 +23,7 @@ REMARK = re.compile(r"//.*|/\*.*|(?:^|\s)#(?!\s*(?:include|define|undef|if|el|en
 # The paper that a comment means by "method", by the folder of its source.
 PAPERS = {"linalg": "projection", "ida_projection": "projection", "contact": "contact", "scene": "events"}
 REFERENCE = re.compile(r"\b(method|detection), (section|eq)s?[. ]+(\d+(?:\.\d+)?(?:, \d+)*)")
+GUIDE = re.compile(r"(?:\b(\w+)/)?README(?:\.md)?, section (\d+)")
 COMMENT = re.compile(r"^\s*(?://+[!<]*|#)\s*(Of|What|Where)\b")
 
 
@@ -145,6 +146,10 @@ def check_source(path, replaced):
             named = PAPERS[room] if place == "method" else place
             for which in set(numbers.split(", ")) - paper(named)[kind]:
                 yield f"{path}:{number}: docs/method/{named}.md has no {kind} {which}"
+        for folder, section in GUIDE.findall(cited):
+            guide = ROOT / (folder or room) / "README.md"
+            if not guide.is_file() or not re.search(rf"^## {section}\.", guide.read_text(), re.M):
+                yield f"{path}:{number}: {folder or room}/README.md has no section {section}"
 
 
 def main(names):

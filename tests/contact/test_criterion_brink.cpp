@@ -37,7 +37,7 @@ struct Brink {
   double error(const Eigen::VectorXd& of, Law law = Law::coulomb) const {
     return evaluate(Problem::dense(A, of, mu), law, x).fixed_point;
   }
-  // The velocity scale of contact/README.md, section 6.
+  // The velocity scale: docs/method/contact.md, eq. 15.
   double scale(const Eigen::VectorXd& of) const {
     double out = 0;
     for (int i = 0; i < kContacts; ++i) {

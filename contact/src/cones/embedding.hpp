@@ -11,7 +11,7 @@
 namespace tether::contact::detail {
 
 /// Every row that is not free is a component of a contact, in units of row_scale(), others are
-/// directions of their own that no other row moves (README, section 21):
+/// directions of their own that no other row moves:
 ///
 ///     nonnegative   (row, own, own), mu = 0
 ///     bounded       (own, row, own), mu = 1; its normal is pressed with the bound, so x_n = bound

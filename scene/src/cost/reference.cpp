@@ -13,7 +13,7 @@ namespace {
 
 // Comparisons are for what ends soon: more than these are a storm.
 constexpr int kMostEvents = 50000, kMostEventSteps = 1000000;
-constexpr double kSame = 1e-12;  // of a time
+constexpr double kTimeRounding = 1e-12;  // relative: nearer times are equal
 
 Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q) {
   const double angle = by.norm();
@@ -82,7 +82,8 @@ Measured measure_once(const Scene& scene, const std::vector<double>& times,
   // Records and expectations stop the run at other times, too.
   std::size_t next = 0;
   options.record = [&](const Engine& engine) {
-    while (next < options.stops.size() && engine.time() >= options.stops[next] * (1 - kSame)) {
+    while (next < options.stops.size() &&
+           engine.time() >= options.stops[next] * (1 - kTimeRounding)) {
       out.samples.times.push_back(options.stops[next]);
       for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].fixed) continue;
@@ -107,9 +108,9 @@ Samples picked(const Samples& all, const std::vector<double>& times) {
   const std::size_t bodies = all.positions.size() / all.times.size();
   std::size_t j = 0;
   for (std::size_t i = 0; i < all.times.size(); ++i) {
-    while (j < times.size() && times[j] < all.times[i] * (1 - kSame)) ++j;
+    while (j < times.size() && times[j] < all.times[i] * (1 - kTimeRounding)) ++j;
     if (j == times.size()) break;
-    if (times[j] > all.times[i] * (1 + kSame)) continue;
+    if (times[j] > all.times[i] * (1 + kTimeRounding)) continue;
     out.times.push_back(all.times[i]);
     for (std::size_t k = i * bodies; k < (i + 1) * bodies; ++k) {
       out.positions.push_back(all.positions[k]);
@@ -125,9 +126,9 @@ double distance(const Samples& a, const Samples& b) {
   const std::size_t bodies = a.positions.size() / a.times.size();
   std::size_t j = 0;
   for (std::size_t i = 0; i < a.times.size(); ++i) {
-    while (j < b.times.size() && b.times[j] < a.times[i] * (1 - kSame)) ++j;
+    while (j < b.times.size() && b.times[j] < a.times[i] * (1 - kTimeRounding)) ++j;
     if (j == b.times.size()) break;
-    if (b.times[j] > a.times[i] * (1 + kSame)) continue;
+    if (b.times[j] > a.times[i] * (1 + kTimeRounding)) continue;
     for (std::size_t k = 0; k < bodies; ++k) {
       const std::size_t m = i * bodies + k, n = j * bodies + k;
       largest = std::max(largest, (a.positions[m] - b.positions[n]).norm());
@@ -150,7 +151,8 @@ std::vector<double> step_ends(const Scene& scene, double step, int least) {
   const double most = std::max(kMostPoses / bodies, static_cast<double>(least));
   const double stride = std::max(1.0, std::ceil(scene.end / step / most));
   std::vector<double> out;
-  for (double k = stride; k * step < scene.end * (1 - kSame); k += stride) out.push_back(k * step);
+  for (double k = stride; k * step < scene.end * (1 - kTimeRounding); k += stride)
+    out.push_back(k * step);
   out.push_back(scene.end);
   return out;
 }
@@ -160,7 +162,7 @@ std::vector<double> merged(const std::vector<double>& a, const std::vector<doubl
   std::merge(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
   std::vector<double> out;
   for (const double t : all)
-    if (out.empty() || t > out.back() * (1 + kSame)) out.push_back(t);
+    if (out.empty() || t > out.back() * (1 + kTimeRounding)) out.push_back(t);
   return out;
 }
 

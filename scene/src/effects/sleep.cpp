@@ -1,6 +1,6 @@
 // Tether: islands of bodies at rest that steps leave out. SPDX-License-Identifier: BSD-3-Clause
 //
-// The contact library's steps do it (contact/README.md, section 13); other engines have none.
+// The contact library's steps do it (docs/method/contact.md, section 7.1); other engines have none.
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {

@@ -193,7 +193,7 @@ std::string shown(const std::string& text) {
 }
 
 const char* Tag::find(std::string_view key) {
-  asked_.emplace(key);
+  keys_read_.emplace(key);
   if (const char* const own = node_.Attribute(std::string(key).c_str())) return own;
   if (defaults_ == nullptr) return nullptr;
   const auto found = defaults_->find(key);
@@ -282,7 +282,7 @@ void Tag::missing(std::string_view key, std::string allowed) {
 
 void Tag::finish(Remarks& remarks, const std::set<std::string, std::less<>>& no_matter) {
   const auto look = [&](std::string_view key) {
-    if (asked_.count(key) == 0 && no_matter.count(key) == 0)
+    if (keys_read_.count(key) == 0 && no_matter.count(key) == 0)
       remarks.add(fmt::format("attribute {} of <{}>", key, node_.Name()), name_or_line(node_));
   };
   for (const auto* each = node_.FirstAttribute(); each != nullptr; each = each->Next())

@@ -84,7 +84,7 @@ class Tag {
   const Node& node_;
   Problems& problems_;
   const Attributes* defaults_;
-  std::set<std::string, std::less<>> asked_;
+  std::set<std::string, std::less<>> keys_read_;
 };
 
 /// `root`: <robot>. Problems are reported; the model is of use where there are none.

@@ -22,7 +22,7 @@ using mechanics::at;
 namespace {
 
 constexpr long kMostTeeth = 1000;
-constexpr double kSameRatio = 1e-9;  // relative
+constexpr double kRatioRounding = 1e-9;  // relative
 
 struct Fraction {
   long over = 0, under = 0;  // 0: none
@@ -37,7 +37,7 @@ Fraction fraction(double ratio) {
     const long p = whole * over[0] + over[1], q = whole * under[0] + under[1];
     if (p > kMostTeeth * kMostTeeth || q > kMostTeeth) break;
     if (std::abs(static_cast<double>(p) / static_cast<double>(q) - std::abs(ratio)) <=
-        kSameRatio * std::abs(ratio))
+        kRatioRounding * std::abs(ratio))
       return {ratio < 0 ? -p : p, q};
     over[1] = std::exchange(over[0], p);
     under[1] = std::exchange(under[0], q);

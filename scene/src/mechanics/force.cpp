@@ -55,10 +55,10 @@ void SteppedBodies::damp(int body, double dt, const Vector3d& force, const Vecto
 
 void SteppedBodies::read(contact::BodySet& set) {
   set_ = &set;
-  look_at(set);
+  copy_motions(set);
 }
 
-void SteppedBodies::look_at(const contact::BodySet& set) {
+void SteppedBodies::copy_motions(const contact::BodySet& set) {
   for (int b = 0; b < set.size(); ++b) {
     if (!bodies_.moves(b)) continue;
     Frame<double>& f = bodies_.frames[at(b)];

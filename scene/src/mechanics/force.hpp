@@ -28,7 +28,7 @@ class SteppedBodies {
   /// Takes over positions and velocities; later calls change `set`.
   void read(contact::BodySet& set);
   /// Both, for what changes nothing.
-  void look_at(const contact::BodySet& set);
+  void copy_motions(const contact::BodySet& set);
   /// Positions only, for energies.
   void read_positions(const contact::BodySet& set);
 

@@ -105,8 +105,8 @@ int open_to_write(const std::string& file, int flags) {
     }
     if (errno != ENXIO) return -1;
     // A sleep ends by every signal that is handled; open() would go on.
-    constexpr timespec kLook{0, 20000000};
-    if (nanosleep(&kLook, nullptr) != 0)
+    constexpr timespec kPollInterval{0, 20000000};  // 20 ms
+    if (nanosleep(&kPollInterval, nullptr) != 0)
       throw Interrupted("interrupted while a reader of " + file + " was waited for");
   }
 }

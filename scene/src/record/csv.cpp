@@ -133,7 +133,7 @@ class CsvRecorder : public Recorder {
       : file_(file),
         start_energy_(run.start_energy),
         forces_(run.scene.output.forces),
-        tells_steps_(run.plan.then_steps > 0) {
+        has_steps_column_(run.plan.then_steps > 0) {
     const Scene& scene = run.scene;
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       if (!scene.bodies[i].fixed) moving_.push_back(i);
@@ -159,7 +159,7 @@ class CsvRecorder : public Recorder {
     add(d.kinetic_energy), add(d.potential_energy), add(energy), add(energy - start_energy_);
     add3(d.momentum), add3(d.angular_momentum);
     add(d.drift);
-    if (tells_steps_) add(engine.in_steps() ? 1 : 0);
+    if (has_steps_column_) add(engine.in_steps() ? 1 : 0);
     const Forces forces = forces_ ? total_forces(engine) : Forces();
     for (const mechanics::Column& column : columns_) add(column.value(d, forces));
     for (const std::size_t i : moving_) {
@@ -189,7 +189,7 @@ class CsvRecorder : public Recorder {
  private:
   std::string header(const Scene& scene) const {
     std::string text = kRecordsHead;
-    if (tells_steps_) text += ",in_steps";
+    if (has_steps_column_) text += ",in_steps";
     for (const mechanics::Column& column : columns_) text += "," + column.name;
     for (const std::size_t i : moving_)
       for (const char* column :
@@ -201,7 +201,7 @@ class CsvRecorder : public Recorder {
 
   std::string file_, line_;
   double start_energy_;
-  bool forces_, tells_steps_;
+  bool forces_, has_steps_column_;
   std::vector<std::size_t> moving_;  // those in the table
   std::size_t bodies_ = 0;           // that move
   std::vector<mechanics::Column> columns_;

@@ -193,7 +193,7 @@ class Run {
     s.penetration = std::max(s.penetration, d.penetration);
     s.residual = std::max(s.residual, d.residual);
     s.contacts = std::max(s.contacts, d.contacts);
-    look_for_fast_turns();
+    note_fastest_turn();
     for (const auto& recorder : recorders_) recorder->record(*engine_, d);
     if (options_.progress) options_.progress(engine_->time());
   }
@@ -215,7 +215,7 @@ class Run {
       refuse("an error");
   }
 
-  void look_for_fast_turns() {
+  void note_fastest_turn() {
     if (!step_ || (!engine_->hand_overs().empty() && !engine_->in_steps())) return;
     for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
       if (const double turn = *step_ * engine_->bodies()[i].angular_velocity.norm();

@@ -43,12 +43,12 @@ std::string all_of(const std::string& file, const std::function<bool()>& interru
   if (in.descriptor < 0) throw std::runtime_error("cannot open the saved state " + file);
   // A device has no end; states hold a few hundred bytes a body.
   constexpr std::size_t kLargest = std::size_t{1} << 32;
-  constexpr int kLook = 100;  // ms
+  constexpr int kPollMilliseconds = 100;
   std::string all, block(std::size_t{1} << 16, '\0');
   const auto is_state = [&] { return all.compare(0, kFormat.size(), kFormat) == 0; };
   while (all.size() <= kLargest) {
     pollfd ready{in.descriptor, POLLIN, 0};
-    if (poll(&ready, 1, kLook) <= 0) {
+    if (poll(&ready, 1, kPollMilliseconds) <= 0) {
       if (interrupted && interrupted())
         throw Interrupted("interrupted while the saved state " + file + " was waited for");
       continue;

@@ -74,7 +74,7 @@ class SmoothEngine : public Engine {
     long steps_left = options_.max_steps;
     const auto stop = [this] { return interrupted(); };
     while (!integrator_->advance(t / units_.time, steps_left, stop) && !interrupted()) anchor();
-    look_at_bodies();
+    update_bodies();
   }
 
   const std::vector<BodyState>& bodies() const override { return bodies_; }
@@ -181,10 +181,10 @@ class SmoothEngine : public Engine {
     anchor_ = t;
     system_->complete(t, y_, yp_);
     integrator_ = std::make_unique<Integrator>(*system_, options_, t, y_, yp_);
-    look_at_bodies();
+    update_bodies();
   }
 
-  void look_at_bodies() {
+  void update_bodies() {
     system_->bodies(integrator_->y().data(), bodies_);
     for (std::size_t b = 0; b < bodies_.size(); ++b)
       if (!scene_.bodies[b].fixed) to_si(units_, bodies_[b]);
@@ -205,7 +205,7 @@ class SmoothEngine : public Engine {
     if (integrator_->time() != t || y != saved)
       throw std::runtime_error(
           "the saved state is of another build or machine: the same steps lead to other bits here");
-    look_at_bodies();
+    update_bodies();
   }
 
   void check_start(double position, double velocity, const char* why) {

@@ -88,7 +88,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
                                      : ida_projection::Polished::differential;
     projection.suppress_algebraic = false;  // IDASetSuppressAlg above stands
     projection.progress = [this](const ida_projection::Progress&) {
-      if (system_.look_at_rows()) session_->projection()->rows_changed();
+      if (system_.choose_rows_after_step()) session_->projection()->rows_changed();
     };
     session_->project(system.constraints(), projection);
   }

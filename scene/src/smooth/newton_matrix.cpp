@@ -147,7 +147,7 @@ void NewtonMatrix::make_dense(N_Vector y, SUNContext context) {
 void NewtonMatrix::make_sparse(double t, N_Vector y, N_Vector yp, SUNContext context) {
   const int N = system_.size();
   writes_.assign(entries_.places.size(), 0);
-  look_nearby(t, y, yp);
+  find_entries_nearby(t, y, yp);
   arrange();
   matrix_.reset(
       SUNSparseMatrix(N, N, static_cast<sunindextype>(row_indices_.size()), CSC_MAT, context));
@@ -158,7 +158,7 @@ void NewtonMatrix::make_sparse(double t, N_Vector y, N_Vector yp, SUNContext con
 
 // Entries that are zero at the start, where all may lie in a plane or rest, are seen at two states
 // nearby.
-void NewtonMatrix::look_nearby(double t, N_Vector y, N_Vector yp) {
+void NewtonMatrix::find_entries_nearby(double t, N_Vector y, N_Vector yp) {
   const double *state = N_VGetArrayPointer(y), *rate = N_VGetArrayPointer(yp);
   const std::vector<double> y0(state, state + system_.size()), yp0(rate, rate + system_.size());
   std::mt19937 random(1);
@@ -170,13 +170,13 @@ void NewtonMatrix::look_nearby(double t, N_Vector y, N_Vector yp) {
   };
   for (const double cj : {1.0, 0.7}) {
     const std::vector<double> near_y = moved(y0), near_yp = moved(yp0);
-    look_at_calls(t, cj, near_y, near_yp);
+    note_written(t, cj, near_y, near_yp);
   }
-  look_at_calls(t, 1.0, y0, yp0);  // last: the system is left as it was
+  note_written(t, 1.0, y0, yp0);  // last: the system is left as it was
 }
 
-void NewtonMatrix::look_at_calls(double t, double cj, const std::vector<double>& y,
-                                 const std::vector<double>& yp) {
+void NewtonMatrix::note_written(double t, double cj, const std::vector<double>& y,
+                                const std::vector<double>& yp) {
   std::vector<double> written(writes_.size(), 0.0);
   std::vector<int> one_by_one(writes_.size());
   std::iota(one_by_one.begin(), one_by_one.end(), 0);

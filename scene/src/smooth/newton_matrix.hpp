@@ -37,9 +37,9 @@ class NewtonMatrix {
  private:
   void make_dense(N_Vector y, SUNContext context);
   void make_sparse(double t, N_Vector y, N_Vector yp, SUNContext context);
-  void look_at_calls(double t, double cj, const std::vector<double>& y,
-                     const std::vector<double>& yp);
-  void look_nearby(double t, N_Vector y, N_Vector yp);
+  void note_written(double t, double cj, const std::vector<double>& y,
+                    const std::vector<double>& yp);
+  void find_entries_nearby(double t, N_Vector y, N_Vector yp);
   void arrange();
   bool grow();
 

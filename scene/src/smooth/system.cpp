@@ -55,7 +55,7 @@ std::vector<std::string> System::dependent_joints(double t, const double* y) {
   std::vector<std::string> names;
   if (rows() == 0) return names;
   update(t, y);
-  in_use_.look_now();
+  in_use_.choose_now();
   if (in_use_.weakest_pivot() > kNear) return names;
   SparseJointGradient gradient(rows_, bodies_);
   gradient.factor(std::vector<char>(at(rows()), 1), kNear);

@@ -331,7 +331,7 @@ Forces SteppingEngine::forces() const {
   if (joints_)
     out.joints = joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(),
                                  stepper_.law_impulses(), stepper_.last_part());
-  stepped_.look_at(stepper_.bodies());
+  stepped_.copy_motions(stepper_.bodies());
   for (const auto& force : forces_) force->report(stepped_.bodies(), out);
   return out;
 }

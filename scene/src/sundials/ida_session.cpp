@@ -10,10 +10,10 @@ namespace tether::scene {
 
 namespace {
 
-constexpr double kFirstError = 0.125;  // of what IDA allows
-constexpr double kFirstMove = 1e-2;    // the part by which a component moves at most
-constexpr double kFirstAtRest = 1e-3;  // s
-constexpr double kLookAhead = 1e-5;    // the part of a move over which y'' is differenced
+constexpr double kFirstError = 0.125;     // of what IDA allows
+constexpr double kFirstMove = 1e-2;       // the part by which a component moves at most
+constexpr double kFirstAtRest = 1e-3;     // s
+constexpr double kDifferencePart = 1e-5;  // the part of a move over which y'' is differenced
 
 }  // namespace
 
@@ -100,16 +100,16 @@ double FirstStep::operator()(double t, const Eigen::VectorXd& y, const Eigen::Ve
   for (Eigen::Index i = 0; i < y.size(); ++i)
     if (sizes[i] != 0) speed = std::max(speed, std::abs(yp[i]) / (sizes[i] + std::abs(y[i])));
   if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
-  const double look = kLookAhead / speed;
-  Eigen::VectorXd ahead = y + look * yp, there(y.size());
-  rate(t + look, ahead, there);
+  const double span = kDifferencePart / speed;
+  Eigen::VectorXd ahead = y + span * yp, there(y.size());
+  rate(t + span, ahead, there);
   double sum = 0;
   for (Eigen::Index i = 0; i < y.size(); ++i) {
     if (sizes[i] == 0) continue;
     const double change = (there[i] - yp[i]) / (tolerance * (sizes[i] + std::abs(y[i])));
     sum += change * change;
   }
-  const double curvature = std::sqrt(sum / static_cast<double>(y.size())) / look;
+  const double curvature = std::sqrt(sum / static_cast<double>(y.size())) / span;
   if (!std::isfinite(curvature)) return 0.5 * tolerance / speed;
   const double most = std::min(kFirstMove / speed, longest);
   return curvature > 0 ? std::min(most, std::sqrt(4 * kFirstError / curvature)) : most;

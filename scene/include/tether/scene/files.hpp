@@ -1,6 +1,6 @@
 // Tether: scene files (TOML). SPDX-License-Identifier: BSD-3-Clause
 //
-// The format, with the unit, default and range of every field: scene/README.md.
+// The format, with the unit, default and range of every field: docs/scene_fields.md.
 #pragma once
 
 #include <stdexcept>

@@ -57,7 +57,7 @@ void add_check_command(CLI::App& app, int* status) {
   command->add_option("scenes", arguments->files, "Scene files (TOML); - is the standard input")
       ->required();
   command->add_flag("--print", arguments->print, "Print the scene with every default spelt out");
-  command->footer("Exit code: 0 right, 2 wrong. The format: scene/README.md.");
+  command->footer("Exit code: 0 right, 2 wrong. The format: docs/scene_fields.md.");
   command->callback([arguments, status] { *status = check(*arguments); });
 }
 

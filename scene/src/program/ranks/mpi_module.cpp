@@ -14,8 +14,8 @@ namespace tether::scene {
 
 namespace {
 
-constexpr std::chrono::milliseconds kLook(2);
-constexpr std::chrono::seconds kPatience(1);
+constexpr std::chrono::milliseconds kPollInterval(2);
+constexpr std::chrono::seconds kAbortAfter(1);  // of waiting for others, after an error
 
 class MpiRanks final : public Ranks {
  public:
@@ -41,7 +41,7 @@ class MpiRanks final : public Ranks {
     std::vector<int> all(2 * static_cast<std::size_t>(messages_->size()));
     MPI_Request request;
     MPI_Iallgather(mine, 2, MPI_INT, all.data(), 2, MPI_INT, MPI_COMM_WORLD, &request);
-    const auto until = std::chrono::steady_clock::now() + kPatience;
+    const auto until = std::chrono::steady_clock::now() + kAbortAfter;
     for (int here = 0; !here;) {
       MPI_Test(&request, &here, MPI_STATUS_IGNORE);
       if (here) break;
@@ -49,7 +49,7 @@ class MpiRanks final : public Ranks {
         say(why);
         MPI_Abort(MPI_COMM_WORLD, status);
       }
-      std::this_thread::sleep_for(kLook);
+      std::this_thread::sleep_for(kPollInterval);
     }
     int code = 0, speaker = -1;
     for (int r = messages_->size() - 1; r >= 0; --r) {

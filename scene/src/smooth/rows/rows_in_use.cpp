@@ -33,7 +33,7 @@ constexpr int kMostTrials = 8;         // velocities
 constexpr double kRounding = 1e-11;    // of g, with room for the next steps
 constexpr double kWeakest = 1e-3, kGood = 0.3;
 constexpr double kMuchWorse = 0.1;
-constexpr int kWait = 4;  // steps between looks while all pivots are good
+constexpr int kWait = 4;  // steps between choices while all pivots are good
 // Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
 // every state; those of closed loops are chosen by their entries.
 constexpr double kLeastWeakByEntries = 1.2e-4;
@@ -188,6 +188,6 @@ void RowsInUse::choose_multipliers() {
   for (int i = 0; i < count_; ++i) carries_[at(order[at(i)])] = 1;
 }
 
-bool RowsInUse::look() { return --wait_ <= 0 && choose(); }
+bool RowsInUse::choose_after_step() { return --wait_ <= 0 && choose(); }
 
 }  // namespace tether::scene::smooth

@@ -35,8 +35,8 @@ class RowsInUse {
   /// Chooses at the state that is set, for this local tolerance from now on.
   void choose(double tolerance);
   /// After a step, at the state that is set. True: used() has other rows than before.
-  bool look();
-  void look_now() { choose(); }
+  bool choose_after_step();
+  void choose_now() { choose(); }
 
  private:
   bool independent_by_structure() const;

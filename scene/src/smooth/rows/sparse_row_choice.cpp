@@ -27,7 +27,7 @@ constexpr int kCloseMoves = 3;
 constexpr double kClosed = 1e-12;  // of a link's length
 constexpr double kStandsOut = 0.1, kGoodChoice = 0.03;
 constexpr double kMuchWorseChoice = 0.1;
-constexpr int kLooks = 16;                      // from one search to the next
+constexpr int kStepsBetweenSearches = 16;
 constexpr double kUsual = 0.3, kUnusual = 0.1;  // of the best weakest pivot so far
 // Velocities that look for thin rows at once, how often what rows forbid is taken from each, and
 // what they must show of a row of unit length.
@@ -35,7 +35,7 @@ constexpr int kProbes = 16, kReleases = 12, kMostRounds = 20;
 constexpr double kReleased = 1e-15, kShown = 1e-10;
 // Part of what a velocity may show by error. A row too few changes the motion, and IDA stops (net
 // of 30 x 30 balls: one); one too many leaves a multiplier undetermined, which costs steps.
-constexpr double kDoubt = 0.02;
+constexpr double kErrorShare = 0.02;
 
 }  // namespace
 
@@ -95,7 +95,7 @@ void SparseRowChoice::add_thin(RowSet& set) {
     qr.factor(shown);
     const linalg::MatrixView R = qr.R();
     const std::vector<int> order = qr.order();
-    const double least = std::max(kShown, kDoubt * left / (0.25 * kDependentByEntries));
+    const double least = std::max(kShown, kErrorShare * left / (0.25 * kDependentByEntries));
     for (added = 0; added < kProbes && std::abs(R(added, added)) > least; ++added)
       set.has[at(order[at(added)])] = 1;
     set.count += added;
@@ -182,12 +182,13 @@ bool SparseRowChoice::choose(double weak) {
   weak = std::min(weak, kUnusual * usual_);
   RowSet carried = carriers_;
   carried.weakest = carriers_.weakest = seen.count < seen_ ? 0 : seen.weakest;
-  const bool as_it_was = carried.weakest > kMuchWorseChoice * weakest_found_ && --looks_left_ > 0;
+  const bool as_it_was =
+      carried.weakest > kMuchWorseChoice * weakest_found_ && --steps_to_search_ > 0;
   if (carried.weakest > good() || (as_it_was && carried.weakest > weak)) {
     kept_ = std::move(carried);
     return false;
   }
-  looks_left_ = kLooks;
+  steps_to_search_ = kStepsBetweenSearches;
   kept_ = best(carriers_.count, weak);
   weakest_found_ = kept_.weakest;
   if (kept_.count != carriers_.count || carried.weakest > kMuchWorseChoice * kept_.weakest) {

@@ -46,7 +46,7 @@ class SparseRowChoice {
   int seen_ = 0;              // of the carriers, those that the factors tell from dependent ones
   double usual_ = 1;          // the largest that their weakest pivot was so far
   double weakest_found_ = 0;  // of the carriers at the last search for better ones
-  int looks_left_ = 0;        // until the next one
+  int steps_to_search_ = 0;   // until the next one
 };
 
 }  // namespace tether::scene::smooth

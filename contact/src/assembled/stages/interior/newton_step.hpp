@@ -10,8 +10,8 @@
 namespace tether::contact::detail {
 
 /// Newton directions for A x - b = w(u), x o u = nu e, scaled by Nesterov and Todd: one
-/// factorisation of W^-1 J^-1 P^-1 A P^-1 W^-1 + 1, any number of right-hand sides (README,
-/// section 9).
+/// factorisation of W^-1 J^-1 P^-1 A P^-1 W^-1 + 1, any number of right-hand sides (method,
+/// section 6).
 class InteriorNewton {
  public:
   void reset(int contacts);
