@@ -15,14 +15,14 @@ namespace {
 constexpr double kStronglyCoupled = 0.98;
 constexpr double kCoupled = 0.8;
 
-// Rounds that do not halve the error before the solve ends, and before contacts are replaced.
-constexpr int kPatience = 6, kPatienceBefore = 2;
+// Rounds that may fail to halve the error: before the solve ends, and before contacts are replaced.
+constexpr int kMostIdleRounds = 6, kMostIdleRoundsBefore = 2;
 
-// Sweeps that a factorisation costs, from which on sweeps go on before stages that take many of
-// them.
-constexpr double kDear = 30;
+// A factorisation that costs this many sweeps is expensive: sweeps then go on for long before
+// stages that need many factorisations.
+constexpr double kExpensive = 30;
 
-constexpr double kGain = 0.7;  // of the error: stages that leave more of it do not get on
+constexpr double kGain = 0.7;  // a stage that leaves more than this part of the error has stalled
 
 // The slip is differentiable at every contact.
 bool is_regular(const System& system) {
@@ -40,8 +40,8 @@ void Automatic::reset(int contacts, const Options& options, bool proofs) {
   contacts_ = contacts;
   options_ = options;
   proofs_ = proofs;
-  pressed_.clear();
-  ready_ = looked_for_proof_ = false;
+  proof_.clear();
+  ready_ = sought_proof_ = false;
 }
 
 void Automatic::prepare() {
@@ -53,7 +53,7 @@ void Automatic::prepare() {
   ready_ = true;
 }
 
-// All stages start from the best point, the sweeps and the proximal path from the sweeps' own.
+// All stages start from the best point, but sweeps and the proximal path from the last sweep.
 Status Automatic::rotate(Search& search, int most_idle) {
   constexpr int kFactorisations = 800;  // of the path by its arclength
   constexpr int kProblems = 12;         // of proximal Newton
@@ -62,20 +62,20 @@ Status Automatic::rotate(Search& search, int most_idle) {
   const bool regular = is_regular(search.system);
   const bool by_bodies = regular && interior_.order_bodies(search);
   double halved = search.best_error;
-  bool first = true, solved = false, dear = false, rounding = false;
+  bool first = true, solved = false, expensive = false, rounding = false;
   const auto turn = [&](bool due, const auto& stage) {
     if (solved || rounding || !due) return;
     stage();
     solved = search.confirmed();
   };
   for (int idle = 0;; first = false) {
-    turn(true, [&] { dear = sweep(search, first, by_bodies); });
+    turn(true, [&] { expensive = sweep(search, first, by_bodies); });
     const double swept = search.best_error;
     if (!solved && search.exhausted()) return Status::work_limit;
-    turn(regular && dear, [&] { proximal_path(search); });
-    turn(regular && !dear && first, [&] { interior_points(search, by_bodies); });
+    turn(regular && expensive, [&] { proximal_path(search); });
+    turn(regular && !expensive && first, [&] { interior_points(search, by_bodies); });
     turn(true, [&] { rounding = at_round_off(search); });
-    turn(regular && !dear && first && !by_bodies, [&] { proximal_path_at_best(search); });
+    turn(regular && !expensive && first && !by_bodies, [&] { proximal_path_at_best(search); });
     turn(regular && first, [&] { interior_.run_arclength(search, kFactorisations, newton_); });
     turn(true, [&] { rounding = at_round_off(search); });
     if (solved) return Status::solved;
@@ -96,7 +96,7 @@ Status Automatic::rotate(Search& search, int most_idle) {
 
 Status Automatic::run_part(Search& search, const Packed& start) {
   search.test(start.data(), By::sweeps);
-  return search.solved() ? Status::solved : rotate(search, kPatienceBefore);
+  return search.solved() ? Status::solved : rotate(search, kMostIdleRoundsBefore);
 }
 
 Status Automatic::run(Search& search) {
@@ -108,9 +108,9 @@ Status Automatic::run(Search& search) {
   bool replaceable = false;
   if (system.law().replacement && !options_.strict)
     for (int i = 0; i < contacts_; ++i) replaceable = replaceable || coupled(i, kCoupled);
-  if (!replaceable) return rotate(search, kPatience);
+  if (!replaceable) return rotate(search, kMostIdleRounds);
   search.work_end = kShortShare * options_.max_work;
-  Status status = rotate(search, kPatienceBefore);
+  Status status = rotate(search, kMostIdleRoundsBefore);
   for (double eccentricity : {kStronglyCoupled, kCoupled}) {
     if (status == Status::solved || status == Status::infeasible) break;
     search.work_end = options_.max_work;
@@ -126,30 +126,29 @@ Status Automatic::run(Search& search) {
     search.best_error = std::numeric_limits<double>::infinity();
     search.test(x_.data(), By::sweeps);
     ready_ = false;
-    status = search.solved()
-                 ? Status::solved
-                 : rotate(search, eccentricity == kCoupled ? kPatience : kPatienceBefore);
+    status = search.solved() ? Status::solved
+                             : rotate(search, eccentricity == kCoupled ? kMostIdleRounds
+                                                                       : kMostIdleRoundsBefore);
   }
   return status;
 }
 
-// Half a factorisation of sweeps by a guess of the fill, then its exact price, for which the matrix
-// is ordered. False: solved, or no work is left.
+// Sweeps for half the price of a factorisation, with a guessed fill; then orders the matrix, which
+// gives the exact price. False: solved, or no work is left.
 bool Automatic::order_after_sweeps(Search& search) {
-  constexpr double kLook = 0.5, kWorth = 3;  // factorisations
+  constexpr double kBeforeOrdering = 0.5, kLeaveBeyond = 3;  // factorisations
   const double price = interior_.cost(search);
   AcceleratedSweeps::Leave leave;
-  leave.price = kWorth * price;
-  leave.least_work = kLook * price;
+  leave.price = kLeaveBeyond * price;
+  leave.least_work = kBeforeOrdering * price;
   sweeps_.run(search, leave);
   if (search.solved() || search.exhausted()) return false;
   interior_.order(search);
   return true;
 }
 
-// Sweeps in turn with solves of the parts where they do not settle, until so much work is done. A
-// round that does not halve the error, once the sweeps have spread it, is followed by more sweeps:
-// those that need no help are soon left alone.
+// Sweeps take turns with solves of the parts in which they do not settle, until the work `until` is
+// done. Solves that do not reduce the error become rarer.
 void Automatic::sweep_and_solve_parts(Search& search, double until) {
   constexpr double kShare = 0.5, kCheap = 0.1, kPartShare = 0.1;      // of the work before
   constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
@@ -181,26 +180,30 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
   }
 }
 
-// Sweeps for a few factorisations, and as long as they forecast less than kWorth. Returns whether a
-// factorisation costs many of them.
+// Sweeps for the price of a few factorisations, and longer while they forecast less than
+// kLeaveBeyond of them. Returns whether a factorisation is expensive.
 bool Automatic::sweep(Search& search, bool first, bool by_bodies) {
-  constexpr double kStay = 3, kStayByBodies = 5, kStayDear = 40, kWorth = 20;  // factorisations
+  constexpr double kStay = 3, kStayByBodies = 5, kStayIfExpensive = 40,
+                   kLeaveBeyond = 20;  // factorisations
   const double begin = search.counts.work;
   if (first && !interior_.ordered() && !order_after_sweeps(search)) return false;
   const double price = interior_.cost(search);
-  const bool dear = !by_bodies && price > kDear * search.sweep_cost;
-  const double until = begin + (by_bodies ? kStayByBodies : dear ? kStayDear : kStay) * price;
-  if (dear) sweep_and_solve_parts(search, until);
-  if (search.solved() || search.exhausted()) return dear;
+  const bool expensive = !by_bodies && price > kExpensive * search.sweep_cost;
+  const double until = begin + (by_bodies   ? kStayByBodies
+                                : expensive ? kStayIfExpensive
+                                            : kStay) *
+                                   price;
+  if (expensive) sweep_and_solve_parts(search, until);
+  if (search.solved() || search.exhausted()) return expensive;
   AcceleratedSweeps::Leave leave;
-  leave.price = kWorth * price;
+  leave.price = kLeaveBeyond * price;
   leave.least_work = until - search.counts.work;
   sweeps_.run(search, leave);
-  return dear;
+  return expensive;
 }
 
-// Sweeps pass by a solution that repels them, and proximal problems from where they are may lead to
-// it. If one of these is not solved it was the wrong place, and sweeps go on to another.
+// Sweeps may pass a solution that repels them; proximal problems from their present point may reach
+// it. If one of these fails, the place was wrong, and sweeps go on to another.
 void Automatic::proximal_path(Search& search) {
   constexpr int kProblems = 100;
   const double end = search.work_end;
@@ -209,7 +212,8 @@ void Automatic::proximal_path(Search& search) {
   search.work_end = end;
 }
 
-// By bodies the path of interior points ends where sweeps were, or further away.
+// With equations by bodies the path of interior points gains nothing over sweeps: only its first
+// point is tested.
 void Automatic::interior_points(Search& search, bool by_bodies) {
   constexpr int kSteps = 40;
   interior_.stick(search);
@@ -218,9 +222,9 @@ void Automatic::interior_points(Search& search, bool by_bodies) {
   solve_parts_of_end(search);
 }
 
-// A few proximal problems lead to a solution near which the path of interior points has ended. One
-// that is not solved says that they do not, but for heavy bodies on light ones, where x has far to
-// go.
+// If the path of interior points ends near a solution, a few proximal problems reach it. The
+// first one that fails ends the attempt, except with heavy bodies on light ones: there x has far to
+// go, and more problems are allowed.
 void Automatic::proximal_path_at_best(Search& search) {
   constexpr double kRough = 1e-2;
   constexpr int kProblems = 20, kMost = 60;
@@ -230,9 +234,9 @@ void Automatic::proximal_path_at_best(Search& search) {
   interior_.run_proximal(search, x_.data(), loaded ? kMost : kProblems, newton_, loaded);
 }
 
-// Between light and heavy bodies the products x.u of a contact that parts and of one that holds a
-// heavy body differ by what round-off takes: interior points end with the former too large, few
-// and far from each other, and all others solved.
+// With large mass ratios the products x.u of separating contacts and of contacts under heavy bodies
+// differ by more digits than a double has. Interior points then leave a few separated contacts
+// unsolved, far from each other, which are solved as parts.
 void Automatic::solve_parts_of_end(Search& search) {
   constexpr double kShare = 0.1;  // of the work before
   constexpr int kRounds = 8;
@@ -247,7 +251,8 @@ void Automatic::solve_parts_of_end(Search& search) {
   }
 }
 
-// From the point where everything sticks, on and on after the error has ceased to fall.
+// Interior points from the point where everything sticks, in bursts that go on although the error
+// no longer falls.
 void Automatic::follow_to_the_end(Search& search) {
   constexpr int kSteps = 10, kBursts = 12;
   interior_.run(search, kSteps);
@@ -258,9 +263,9 @@ void Automatic::follow_to_the_end(Search& search) {
   }
 }
 
-// Impulses of contacts wedged against each other may grow without an end along the null space of a
-// singular A, beside solutions of the size of b. Proximal problems then start from much smaller
-// ones.
+// Impulses of contacts wedged against each other may grow without bound along the null space of a
+// singular A, although solutions of the size of b exist. Proximal problems then start from much
+// smaller impulses.
 void Automatic::proximal_path_from_small(Search& search) {
   constexpr double kGrown = 10;  // times the impulses by which all stick
   constexpr int kProblems = 60;
@@ -277,19 +282,18 @@ void Automatic::proximal_path_from_small(Search& search) {
   }
 }
 
-// Looked for once in a solve, where the quick stages have failed.
+// The proof is sought once in a solve, after the quick stages have failed.
 bool Automatic::infeasible(Search& search) {
-  if (proofs_ && !looked_for_proof_) {
-    looked_for_proof_ = true;
-    if (!proves_infeasible(search, pressed_)) pressed_.clear();
+  if (proofs_ && !sought_proof_) {
+    sought_proof_ = true;
+    if (!proves_infeasible(search, proof_)) proof_.clear();
   }
-  return !pressed_.empty();
+  return !proof_.empty();
 }
 
-// Whether what is left is what round-off makes of A x - b: its bound explains the error, and steps
-// with long sums gain nothing any more. They end within 1 to 3 units of it on stacks of 100 to 2000
-// boxes of masses 1 : 1e6 to 1 : 1e12.
-// Steps that are stuck near the point, far above that, give way to others from further away.
+// Whether the error is the round-off of A x - b: its bound explains the error, and steps with long
+// sums gain nothing. On stacks with large mass ratios they end within kUnits of that bound. Steps
+// that stall above it, near the point, are followed by steps from further away.
 bool Automatic::at_round_off(Search& search) {
   constexpr int kSteps = 8;
   constexpr double kUnits = 4, kNearly = 100;
@@ -308,8 +312,8 @@ bool Automatic::at_round_off(Search& search) {
   return false;
 }
 
-// Plain sweeps from the best point that keep moving are a cycle (or a wander), those that come to
-// rest above the tolerance are a stall.
+// Plain sweeps from the best point decide: if they keep moving the iteration cycles, if they come
+// to rest above the tolerance it has stalled.
 Status Automatic::give_up(Search& search) {
   constexpr int kSweeps = 100;
   if (infeasible(search)) return Status::infeasible;

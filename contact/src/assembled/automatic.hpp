@@ -8,19 +8,18 @@
 
 namespace tether::contact::detail {
 
-// method, section 10.
+// The order of the methods (method, section 10).
 class Automatic {
  public:
-  // Before a solve; storage is kept. proofs: whether a proof that there is no solution is looked
-  // for.
+  // Called before a solve; keeps the storage. proofs: whether to seek a proof of infeasibility.
   void reset(int contacts, const Options& options, bool proofs = true);
-  // From the point where one sweep has not done, which search.best holds.
+  // Solves from search.best, which one sweep did not solve.
   Status run(Search& search);
   // A part of a larger problem, from `start`: the stages without replacements of the law.
   Status run_part(Search& search, const Packed& start);
 
   // The normal impulses that prove infeasibility; empty: none are known.
-  const Packed& proof() const { return pressed_; }
+  const Packed& proof() const { return proof_; }
 
  private:
   void prepare();
@@ -43,9 +42,9 @@ class Automatic {
   ProximalNewton newton_;
   InteriorPoint interior_;
   LocalSolves parts_, end_parts_;
-  Packed x_, z_, pressed_;
+  Packed x_, z_, proof_;
   int contacts_ = 0;
-  bool ready_ = false, proofs_ = true, looked_for_proof_ = false;
+  bool ready_ = false, proofs_ = true, sought_proof_ = false;
 };
 
 }  // namespace tether::contact::detail

@@ -68,8 +68,7 @@ void IslandSolves::solve(Search& search, Island& island, double budget) {
 Status IslandSolves::run(Search& search, Automatic& stages) {
   find_islands(search);
   x_ = search.best;
-  // The small ones first, each with an equal part of the work that is left: what they leave of it
-  // is for the larger ones.
+  // Small islands first, each with an equal part of the work left: larger ones get what these save.
   std::vector<Island*> order;
   for (Island& island : islands_) order.push_back(&island);
   std::stable_sort(order.begin(), order.end(),
@@ -81,17 +80,17 @@ Status IslandSolves::run(Search& search, Automatic& stages) {
     else
       order[k]->status = Status::work_limit;
   }
-  // Each island is at its best, also beside one that cannot be solved.
+  // Each island keeps its best point, also if another one is not solved.
   search.best_error = std::numeric_limits<double>::infinity();
   search.test(x_.data(), By::factors);
   if (search.solved()) return Status::solved;
-  // The last status of this list that an island has is the one that says most.
+  // The status that says most comes last in this list.
   Status out = Status::solved;
   for (Status s : {Status::unsolved, Status::stalled, Status::cycling, Status::round_off,
                    Status::work_limit, Status::infeasible})
     for (const Island& island : islands_)
       if (island.status == s) out = s;
-  // Each is solved by itself, and not beside the others: what rounding left is for all stages.
+  // Solved one by one, but not together: rounding of one island exceeds the tolerance of another.
   return out == Status::solved ? stages.run(search) : out;
 }
 

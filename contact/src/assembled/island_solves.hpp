@@ -5,16 +5,16 @@
 
 namespace tether::contact::detail {
 
-// Islands do not feel each other, but stages that take them together do: interior points have one
-// step length and one factorisation for all, round-off that explains the error of one is that of
-// the impulses of another, and sweeps go on everywhere until the last one ends. So each island is a
-// problem of its own.
+// Islands are independent, but stages that solve them together couple them. Interior points have
+// one step length for all; the round-off of large impulses in one island hides the error of
+// another; sweeps go on in all until the slowest has ended. So each island is solved as a problem.
 class IslandSolves {
  public:
-  // Whether there is anything to take apart, by a measure that is one of islands. One island that
-  // holds nearly all contacts is the problem: taken out, its sweeps would only begin anew.
+  // Whether a solve by islands is worth while: the measure is one of islands, and no island holds
+  // nearly all contacts (its sweeps would only begin again).
   static bool serve(const Search& search);
-  // From search.best; `stages` take all together what is solved one by one and not beside others.
+  // Solves from search.best. If each island is solved by itself but their union is not, `stages` go
+  // on with all of them together.
   Status run(Search& search, Automatic& stages);
   // The normal impulses that prove infeasibility; empty: none are known.
   const Packed& proof() const { return proof_; }

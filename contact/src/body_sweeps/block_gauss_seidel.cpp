@@ -107,7 +107,8 @@ void BodySolver::Implementation::iterate(int k, Team& team) {
         break;
       }
       next_test = r.sweeps + ++failed_tests;
-    } else if (best.look(r.sweeps, change.most) && best.improved(sweeps.test(island, team).most)) {
+    } else if (best.is_due(r.sweeps, change.most) &&
+               best.improved(sweeps.test(island, team).most)) {
       save(island, team);
     }
     if (r.ended) {

@@ -18,7 +18,7 @@ class Momentum {
   // beta, given the sum of squares that the last sweep changed.
   double next(double change) {
     best_ = std::min(best_, change);
-    if (++count_ == window_end_) look_back();
+    if (++count_ == window_end_) end_window();
     const double grown = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
     double beta = (t_ - 1) / grown;
     if (change > allowed_ * last_) {
@@ -34,7 +34,7 @@ class Momentum {
  private:
   static constexpr double kNone = std::numeric_limits<double>::infinity();
 
-  void look_back() {
+  void end_window() {
     if (best_ > 0.25 * best_before_) {  // of squares: not halved
       allowed_ = allowed_ > 1 ? 1 : 1.2;
       t_ = 1;
@@ -50,13 +50,12 @@ class Momentum {
   int count_ = 0, window_ = 100, window_end_ = 100;
 };
 
-// The best point of an island that may never be solved. Residuals of earlier points cost a pass
-// each: they are looked at where a sweep changes clearly less than at the last look or that is long
-// ago, and only where the forecast passes max_sweeps, half of them are gone, or changes begin to
-// rise in a long run.
+// Keeps the best point of an island that may never be solved. A test of a point costs a pass. It is
+// due where a sweep changes clearly less than at the last test, or that was long ago. It is due
+// only where the forecast passes max_sweeps, half of them are used, or changes rise in a long run.
 class BestPoint {
  public:
-  static constexpr int kFirst = 64;  // sweeps before the first look
+  static constexpr int kFirst = 64;  // sweeps before the first test
 
   explicit BestPoint(int max_sweeps) : max_sweeps_(max_sweeps) {}
   // residual: of a point that is saved already.
@@ -66,7 +65,7 @@ class BestPoint {
   }
   void forecast(double sweeps) { slow_ = !(sweeps <= max_sweeps_); }
   // change: sum of squares that the last sweep changed.
-  bool look(int sweeps, double change) {
+  bool is_due(int sweeps, double change) {
     const bool rises = change > last_ && sweeps >= kLong;
     last_ = change;
     if (!wanted_ || sweeps < next_) return false;

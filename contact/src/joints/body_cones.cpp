@@ -111,15 +111,16 @@ void BodyCones::add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::si
   Mechanism& mechanism = mechanisms[sides_[begin].node];
   for (std::size_t p = begin; p < end;) {
     const int j = sides_[p].place;
-    answer_.setZero(mechanism.entries(), sides_[p].H.rows());
+    response_.setZero(mechanism.entries(), sides_[p].H.rows());
     for (; p < end && sides_[p].place == j; ++p)
-      answer_.middleRows(6 * mechanisms.place_of(sides_[p].body), 6) += sides_[p].H.transpose();
-    for (Eigen::Index k = 0; k < answer_.cols(); ++k) mechanism.project(answer_.col(k).data());
+      response_.middleRows(6 * mechanisms.place_of(sides_[p].body), 6) += sides_[p].H.transpose();
+    for (Eigen::Index k = 0; k < response_.cols(); ++k) mechanism.project(response_.col(k).data());
     // Squares: never negative, and small where the joints hold a direction.
-    A_.push_back({j, j, answer_.transpose() * answer_});
+    A_.push_back({j, j, response_.transpose() * response_});
     for (std::size_t q = p; q < end; ++q)
-      A_.push_back({sides_[q].place, j,
-                    sides_[q].H * answer_.middleRows(6 * mechanisms.place_of(sides_[q].body), 6)});
+      A_.push_back(
+          {sides_[q].place, j,
+           sides_[q].H * response_.middleRows(6 * mechanisms.place_of(sides_[q].body), 6)});
   }
 }
 
@@ -273,13 +274,13 @@ void BodyCones::apply(Mechanisms& mechanisms, const linalg::VectorX& x, std::vec
     }
     Mechanism& mechanism = mechanisms[node];
     Eigen::Map<Eigen::VectorXd> pull(mechanisms.pull(node).data(), mechanism.entries());
-    answer_.setZero(mechanism.entries(), 1);
+    response_.setZero(mechanism.entries(), 1);
     for (std::size_t p = begin; p < end; ++p)
-      answer_.middleRows(6 * mechanisms.place_of(sides_[p].body), 6) += impulse(sides_[p]);
-    pull -= answer_.col(0);
-    mechanism.project(answer_.data());
-    pull += answer_.col(0);
-    mechanisms.add(node, answer_.data(), v);
+      response_.middleRows(6 * mechanisms.place_of(sides_[p].body), 6) += impulse(sides_[p]);
+    pull -= response_.col(0);
+    mechanism.project(response_.data());
+    pull += response_.col(0);
+    mechanisms.add(node, response_.data(), v);
   }
 }
 

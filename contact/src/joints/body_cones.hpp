@@ -106,7 +106,7 @@ class BodyCones {
   std::vector<Entry> A_;
   std::vector<BodyCone::Column> alone_;
   std::vector<Held> held_;
-  Eigen::MatrixXd answer_;
+  Eigen::MatrixXd response_;
 };
 
 }  // namespace tether::contact::detail

@@ -24,16 +24,16 @@ void Search::reset(const Problem& problem, const Options& o) {
   test_cost = o.measure == Measure::fixed_point ? 1.2 * sweep_cost : 0.8 * sweep_cost;
 }
 
-// Never below what round-off of x makes of it: impulses that swallow b leave a small residual by
-// chance. Long sums are taken where those of doubles may decide. Sweeps do not ask for them first.
+// The error, at least the round-off of A x - b: impulses that swallow b leave a small residual by
+// chance. Long sums are taken where the rounding of doubles may decide; sweeps take them last.
 double Search::fixed_point_error(const PackedVector* x, By by) {
-  constexpr double kLook = 1e3;  // tolerances
+  constexpr double kNear = 1e3;  // tolerances
   const double tolerance = options.tolerance;
   const Test test = system.fixed_point(x);
   // The block fixed point leads the search, also where it has jumped away: `least` ends it.
   const double fast = test.least <= tolerance ? test.least : test.fixed;
   double rounding = 0;
-  if (fast <= tolerance || (by == By::factors && fast <= kLook * tolerance)) {
+  if (fast <= tolerance || (by == By::factors && fast <= kNear * tolerance)) {
     rounding = system.rounding(x);
     hidden_ = kSumUnits * rounding;
   }

@@ -7,7 +7,8 @@
 
 namespace tether::contact::detail {
 
-// Who has found a point: sweeps do not solve down to round-off between light and heavy bodies.
+// The kind of stage that has found a point. With large mass ratios sweeps do not reach round-off,
+// so long sums are not spent on their points.
 enum class By { sweeps, factors };
 
 // Stages improve the same best point; none may overwrite it by a worse one (method, section 3).
@@ -24,16 +25,15 @@ struct Search {
   void reset(const Problem& problem, const Options& o);
   // Measures x, keeps it if it is the best.
   double test(const PackedVector* x, By by);
-  // Whether errors near the tolerance are found with long sums, those of doubles being round-off.
+  // Whether errors near the tolerance need long sums, because sums of doubles are only round-off.
   bool near_round_off() const { return hidden_ > options.tolerance; }
-  // Whether round-off may be what is left of the best point, whose error is then found with long
-  // sums.
+  // Whether round-off may explain the error of the best point, which is then found with long sums.
   bool explained_by_round_off();
-  // Errors of all contacts, as velocities over the scales of their islands: what a block solution
-  // changes, or with long sums near_round_off() what is judged. Returns the largest.
+  // Errors of all contacts, as velocities over the scales of their islands: the change by a block
+  // solution, or near_round_off() the judged error by long sums. Returns the largest.
   double errors(const PackedVector* x, double* each);
   bool solved() const { return best_error <= options.tolerance; }
-  // Whether it is solved for one who does not know where slips were found last, as evaluate().
+  // Whether it is solved without knowledge of the last slips, as evaluate() judges it.
   bool confirmed();
   bool exhausted() const {
     return counts.work > work_end ||
@@ -48,7 +48,7 @@ struct Search {
   double fixed_point_error(const PackedVector* x, By by);
 
   Packed scratch_;
-  double hidden_ = 0;  // errors that round-off of double sums may make; 0: not near the tolerance
+  double hidden_ = 0;  // error that round-off of double sums may hide; 0: not near the tolerance
 };
 
 }  // namespace tether::contact::detail

@@ -41,9 +41,9 @@ double relative(const Norms& n, double norm_b) {
 
 }  // namespace
 
-// Powers of two that bring the largest trace of a block and the largest component of b near 1, if
-// they are out of the ordinary in an island: of the whole problem, or where that does not do of
-// each island. Sums and products then round as in ordinary units.
+// Chooses units (powers of two) in which the largest trace of a block and the largest component of
+// b are near 1, if they are extreme in some island. One unit for the whole problem is preferred to
+// one for each island. Sums and products then round as in ordinary units.
 void System::choose_units(const Problem& given) {
   problem_ = &given;
   mass_.clear();
@@ -209,9 +209,9 @@ double System::natural_map(const PackedVector* x, PackedVector* scratch) const {
 Test System::fixed_point(const PackedVector* x) { return kernels().error(error_view(), x); }
 double System::judged_fixed_point(const PackedVector* x) {
   const double round_off = rounding(x), fast = fixed_point(x).least;
-  const double hidden = kSumUnits * round_off;  // how far long sums may be from it
-  // On the brink of sliding a strongly coupled contact has a second solution far away, to which the
-  // last bit of b leads.
+  const double hidden = kSumUnits * round_off;  // bound on the difference from long sums
+  // On the brink of sliding a change of the last bit of b leads a strongly coupled contact to a
+  // second solution, far away (method, section 3.3): hence the minimum.
   const double error = fast <= hidden ? std::min(exact_fixed_point(x), fast + hidden) : fast;
   return std::max(error, round_off);
 }
@@ -225,8 +225,8 @@ View System::error_view() {
   return s;
 }
 
-// The map hangs on the units, those given are meant. It is homogeneous in x and w together: all is
-// divided by what makes the largest of them 1.
+// The natural map depends on units and is evaluated in the given ones. It is homogeneous in x and w
+// together: both are divided by the power of two that makes the largest entry about 1.
 double System::natural_map_given(const PackedVector* x, PackedVector* scratch) const {
   const View s = view(*problem_, any_replaced_ ? rule_.data() : nullptr, nullptr, nullptr);
   multiply(s, x, scratch);

@@ -26,20 +26,20 @@ struct Proximal {
   const PackedVector* anchor = nullptr;
 };
 
-// Loads (System::load) above this are those of heavy bodies on light ones.
+// A larger load (System::load) means heavy bodies on light ones.
 constexpr double kOrdinaryLoad = 1e3;
 
-// A problem together with the law for each contact. Kernels are built for the machine at hand.
+// A problem together with the law of each contact. Kernels are chosen for the processor.
 class System {
  public:
   void reset(const Problem& problem, Law law);
 
-  // After reset() with the problem of some contacts of `whole`: the same rules and velocity scales.
+  // After reset() with some contacts of `whole`: takes over its laws and velocity scales.
   void belong_to(const System& whole, const int* contacts);
-  // And the same parts of bodies: `whole` may have blocks of zeros beside those of an island.
+  // And its shares of bodies (method, 3.1), which blocks of zeros in `whole` change.
   void share_as(const System& whole, const int* contacts);
 
-  // The problem that the stages see: the given one, or in units in which nothing leaves the range.
+  // The problem that stages solve: the given one, or the same in units without overflow.
   const Problem& problem() const { return *problem_; }
   bool in_other_units() const { return !mass_.empty(); }
   // Impulses of the given problem in these units, and back. Exact within the range of doubles.
@@ -60,12 +60,12 @@ class System {
   double norm_b() const { return norm_b_; }
   bool replaced(int i) const { return any_replaced_ && rule_[at(i)] != 0; }
   bool any_replaced() const { return any_replaced_; }
-  // The law that replaces this one, at contact i.
+  // Contact i obeys the law's replacement from now on.
   void replace(int i);
   double weight(int i) const { return weight_[at(i)]; }
   const std::vector<double>& weights() const { return weight_; }
   double lambda(int i) const { return lambda_[at(i)]; }
-  // Slips are searched for anew.
+  // The next block solutions search for their slips from the start.
   void forget_slips() { std::fill(lambda_.begin(), lambda_.end(), -1); }
 
   // One Gauss-Seidel sweep on x in place, contacts in the given order.
@@ -74,36 +74,35 @@ class System {
   // for, derivatives dx/db of each block; returns (sum weight^2 |out - x|^2)^1/2.
   double blocks(const PackedVector* x, PackedVector* out, const Proximal& proximal = {},
                 Regime* regimes = nullptr, LocalDerivative* derivatives = nullptr);
-  // z are block solutions; change_i is how far z_i is from x_i, as a velocity over the scale of the
-  // island.
+  // z: block solutions; change_i: |z_i - x_i| as a velocity over the scale of the island.
   void changes(const PackedVector* x, PackedVector* z, double* change);
   // w = A x - b
   void velocities(const PackedVector* x, PackedVector* w) const;
-  // The same for another b: changes keep digits that b would take.
+  // The same for another b: for changes, whose digits b would absorb.
   void velocities(const PackedVector* x, const PackedVector* b, PackedVector* w) const;
   // Natural map over the norms (scratch is overwritten), or the block fixed point.
   double natural_map(const PackedVector* x, PackedVector* scratch) const;
   Test fixed_point(const PackedVector* x);
-  // Both with long sums (law/exact_error.hpp): where rounding() is not far below what counts.
+  // With long sums (law/exact_error.hpp), for errors that are not far above rounding().
   void exact_velocities(const PackedVector* x, PackedVector* w) const;
-  // Null, or where the errors of all contacts go.
+  // each: receives the errors of all contacts, or null.
   double exact_fixed_point(const PackedVector* x, double* each = nullptr);
-  // The larger one of error and round-off, with long sums where it needs them: what is reported.
+  // The reported error: the larger one of error and round-off, by long sums where needed.
   double judged_fixed_point(const PackedVector* x);
-  // Rounding of w = A x - b, relative to the velocity scale of the island: the largest component of
-  // u |A| |x|. A residual below it says nothing.
+  // Rounding of w = A x - b (method, section 3.2): the largest component of u |A| |x| over the
+  // velocity scale of its island.
   double rounding(const PackedVector* x) const;
   // |A| |x| relative to the velocity scale: 10 to 1000 between bodies of similar masses.
   double load(const PackedVector* x) const { return rounding(x) / kRoundOff; }
   // 1 / velocity scale of the island of contact i.
   double inverse_scale(int i) const { return inverse_scale_[at(i)]; }
   int islands() const { return static_cast<int>(needed_.size()); }
-  // b = 0 in the island of contact i: the solution is x = 0, and nothing else is judged as one.
+  // b = 0 in the island of contact i: only x = 0 counts as its solution.
   bool at_rest(int i) const { return inverse_scale_[at(i)] == kAtRest; }
 
   // gamma of contact i in its own frame: slip is opposite to x_t / |x_t| + gamma.
   void gamma(int i, double* out) const { law_of(i).gamma(problem_->local(i), out); }
-  // At the solution x, w of this problem.
+  // The linearised law of contact i at the solution x, w.
   void tangent(int i, const PackedVector& x, const PackedVector& w, LawTangent& out) const {
     law_of(i).tangent(problem_->local(i), x.v, w.v, out);
   }

@@ -42,8 +42,8 @@ void AcceleratedSweeps::replace(const PackedVector* x) {
   later_ = {sweeps_, 0};
 }
 
-// x_n > 0 and the cone: 0 separated, 1 sticking, 2 sliding. Counts what is not as in the last
-// sweep.
+// The number of contacts whose regime (0 separated, 1 sticking, 2 sliding) differs from that of the
+// last sweep.
 int AcceleratedSweeps::toggles(const System& system) {
   int count = 0;
   for (int i = 0; i < n_; ++i) {
@@ -57,10 +57,10 @@ int AcceleratedSweeps::toggles(const System& system) {
   return count;
 }
 
-// Extrapolation serves where the contacts have settled: across a change of regime it throws sweeps
-// back, and where they toggle for good it keeps them toggling. So it begins after a few quiet
-// sweeps and ends with the quiet; each failure doubles the quiet that is asked for, a tenth of |f|
-// pays it back.
+// Extrapolation helps once regimes have settled. Across a change of regime it undoes progress, and
+// it keeps toggling contacts toggling. So it begins after some quiet sweeps, in which few regimes
+// change, and ends with them. Each failure doubles the number of quiet sweeps required; a reduction
+// of |f| to a tenth resets it.
 bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   const bool calm = toggled <= std::max(kToggles, static_cast<int>(kToggledShare * n_));
   quiet_ = calm ? quiet_ + 1 : 0;
@@ -107,9 +107,9 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   return true;
 }
 
-// Sweeps to the tolerance by the rate of |f| over the last ten, or over the last half or three
-// quarters of all: where contacts toggle the one is noise, where they have just settled the other
-// is the past.
+// Forecasts the sweeps to the tolerance from the rate of |f|, over the last ten sweeps or over the
+// last half to three quarters of all; the better one counts. While contacts toggle the former is
+// noise; just after they have settled the latter is out of date.
 double AcceleratedSweeps::forecast(int sweep, double f, double log_gain) const {
   double most = std::numeric_limits<double>::infinity();
   if (sweep <= kRecent) return 0;
@@ -165,13 +165,12 @@ void AcceleratedSweeps::run(Search& search, const Leave& leave) {
     if (leave.most_work > 0 && search.counts.work - begin >= leave.most_work) return;
     if (search.counts.work - begin >= leave.least_work) {
       const double left = forecast(sweep, f, std::log(search.options.tolerance / last_error));
-      // Work that is spent already counts as well: at the price of the other stages only a sure end
-      // is waited for.
+      // Work already spent counts: the more was spent, the shorter a forecast has to be.
       const double allowed =
           std::max(0.1 * leave.price, leave.price - (search.counts.work - begin));
       const bool slow = left * (search.sweep_cost + accelerated_cost) > allowed;
       slow_ = slow ? slow_ + 1 : 0;
-      // Forecasts are noise: they have to agree for a while.
+      // Forecasts scatter: only a row of slow ones counts.
       if (slow_ > std::min(sweep / 8, kPersuaded)) return;
     }
     recent_[sweep % kRecent] = f;
