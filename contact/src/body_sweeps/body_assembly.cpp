@@ -83,8 +83,9 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
     judge_with_long_sums(k);
 }
 
-// Sweeps that had not come to their end go on from where the assembled problem is left unsolved;
-// where contacts are replaced, which they do not know, the problem goes on with all of the work.
+// If the assembled problem is not solved, sweeps go on from its best point, unless they had ended.
+// They cannot: with replaced contacts, whose law they do not have, the problem gets all of the
+// work.
 void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
   Team one{0, 1, nullptr, &worker.scratch};
@@ -105,8 +106,8 @@ void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
   if (!r.saved) sweeps.unpack(island, one, *out);
 }
 
-// Solved as a Problem, not by the velocities of the bodies: where impulses between heavy bodies act
-// on light ones these are the round-off of their double sums, and found with long ones.
+// For islands solved as a Problem whose error by the bodies' velocities is above the tolerance.
+// With heavy bodies on light ones that may be round-off of double sums; long sums decide.
 void BodySolver::Implementation::judge_with_long_sums(int k) {
   const Island& island = graph.islands[at(k)];
   IslandResult& r = results[at(k)];

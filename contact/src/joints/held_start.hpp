@@ -5,14 +5,14 @@
 
 namespace tether::contact::detail {
 
-/// Whether contacts share their forces in more than one way, as four wheels of a cart do: an
-/// iteration may end at any lawful split, and once it has left that of the steps before it stays
-/// with the other. (Slips that depend on each other, in a chain that lies on the floor, do not
-/// count: held by stress along it, it left its rest.)
+/// Whether contacts can share their loads in more than one way, as four wheels of a cart can. An
+/// iteration may end at any lawful distribution and would jump between them from step to step.
+/// (Slips that depend on each other, as in a chain on the floor, do not count: with a stress along
+/// it the chain did not stay at rest.)
 bool share_loads(const ConeProblem& problem);
 
-/// The least x, each row in its own scale, that leaves w = A x - b = 0: it hangs on nothing but A
-/// and b. Sets x to that and returns true where Coulomb's law allows it.
+/// The least x, each row in its own scale, with A x = b: it depends on A and b alone. Sets x to it
+/// and returns true if Coulomb's law allows it.
 bool hold_all(const ConeProblem& problem, double tolerance, linalg::VectorX& x);
 
 }  // namespace tether::contact::detail

@@ -26,7 +26,7 @@ class LawRows {
   std::vector<double> plastic;   ///< of the last one without restitution
   bool active = true;            ///< false: no problem includes them
 
-  std::vector<Strike> strikes;  ///< of limits, in this part
+  std::vector<Strike> strikes;  ///< of limits, in this sub-step
 
   bool in(LawUse use, int law) const {
     return use == LawUse::all || use == LawUse::plastic || use == LawUse::closing ||
@@ -38,7 +38,7 @@ class LawRows {
   BodyCone cone(int law, LawUse use) const;
   /// From the impulse of the last step; null: there is none.
   double start(int law, const Eigen::Vector3d* last) const;
-  /// v: at the end of the part.
+  /// v: at the end of the sub-step.
   LawState state(int law, const std::vector<Vector6d>& v) const;
 
  private:

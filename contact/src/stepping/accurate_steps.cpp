@@ -12,13 +12,14 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSafety = 0.8;      // of the wanted accuracy
-constexpr double kShortest = 1e-9;   // of a step: parts that are accepted as they are
-constexpr double kAtOnce = 0.1;      // of the accuracy: what an impact may come too early
-constexpr int kManyImpacts = 1000;   // in a step: from then on they end it in as many parts at most
+constexpr double kSafety = 0.8;     // of the wanted accuracy
+constexpr double kShortest = 1e-9;  // of a step: sub-steps that are accepted as they are
+constexpr double kAtOnce = 0.1;     // of the accuracy: what an impact may come too early
+constexpr int kManyImpacts =
+    1000;  // in a step: from then on they end it in as many sub-steps at most
 constexpr double kSlips = 1 - 1e-6;  // of the cone
-constexpr double kStill = 0.01;      // of the accuracy: a slip that moves nothing in a part
-constexpr double kBeforeEnd = 0.95;  // of a part: a switch that ends it
+constexpr double kStill = 0.01;      // of the accuracy: a slip that moves nothing in a sub-step
+constexpr double kBeforeEnd = 0.95;  // of a sub-step: a switch that ends it
 
 Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaternion& to) {
   linalg::Quaternion d = to * from.conjugate();
@@ -46,7 +47,7 @@ double zero_behind(double ta, double a, double tb, double b) {
 
 }  // namespace
 
-// With impulses of the last part as far as they go with its length.
+// Scales the warm start by the ratio of lengths, at most 2.
 void AccurateSteps::advance(double time, double length) {
   if (stepper_.solver && control.length > 0)
     stepper_.solver->scale_warm_start(std::min(2.0, length / control.length));
@@ -54,7 +55,7 @@ void AccurateSteps::advance(double time, double length) {
   halving_.advance(halving_.whole(time, length));
 }
 
-// Lists what contacts have done in the part just taken.
+// Lists what contacts have done in the sub-step just taken.
 void AccurateSteps::list_active(double length, std::vector<Active>& list) const {
   list.clear();
   if (stepper_.joints) list_laws(length, list);
@@ -66,7 +67,8 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
     const double normal = c.normal.dot(x);
     const Vector3d tangent = x - normal * c.normal;
     const bool slips = c.mu > 0 && !(tangent.norm() < kSlips * c.mu * normal);
-    list.push_back({c.id, slips ? Does::slips : Does::sticks, slips ? tangent : Vector3d::Zero()});
+    list.push_back(
+        {c.id, slips ? Behaviour::slips : Behaviour::sticks, slips ? tangent : Vector3d::Zero()});
     Active& a = list.back();
     a.force = normal / length;
     a.margin = (c.mu * normal - tangent.norm()) / length;
@@ -78,9 +80,10 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
   if (stepper_.rolling) list_moments(list);
   for (const Impact& i : stepper_.impacts->list())
     if (moment(i, length).early < length)
-      list.push_back({stepper_.contacts.points[at(i.contact)].id, Does::strikes, Vector3d::Zero()});
+      list.push_back(
+          {stepper_.contacts.points[at(i.contact)].id, Behaviour::strikes, Vector3d::Zero()});
   std::sort(list.begin(), list.end(), [](const Active& a, const Active& b) {
-    return a.id != b.id ? a.id < b.id : a.what < b.what;
+    return a.id != b.id ? a.id < b.id : a.behaviour < b.behaviour;
   });
 }
 
@@ -91,7 +94,7 @@ void AccurateSteps::list_laws(double length, std::vector<Active>& list) const {
   for (std::size_t k = 0; k < laws.size(); ++k) {
     const LawState& law = laws[k];
     if (law.impulse == 0 || std::isinf(law.bound)) continue;  // springs never slip
-    list.push_back({~std::uint64_t{0} - k, law.side != 0 ? Does::slips : Does::sticks,
+    list.push_back({~std::uint64_t{0} - k, law.side != 0 ? Behaviour::slips : Behaviour::sticks,
                     law.side * Vector3d::UnitX()});
     Active& a = list.back();
     a.force = std::abs(law.impulse) / length;
@@ -114,12 +117,12 @@ void AccurateSteps::list_moments(std::vector<Active>& list) const {
     if (m.rolling > 0) {
       const bool turns = !(roll.norm() < kSlips * m.rolling * normal);
       list.push_back(
-          {c.id, turns ? Does::rolls : Does::rolls_not, turns ? roll : Vector3d::Zero()});
+          {c.id, turns ? Behaviour::rolls : Behaviour::rolls_not, turns ? roll : Vector3d::Zero()});
     }
     if (m.torsional > 0) {
       const bool turns = !(spin.norm() < kSlips * m.torsional * normal);
       list.push_back(
-          {c.id, turns ? Does::spins : Does::spins_not, turns ? spin : Vector3d::Zero()});
+          {c.id, turns ? Behaviour::spins : Behaviour::spins_not, turns ? spin : Vector3d::Zero()});
     }
   }
 }
@@ -127,13 +130,14 @@ void AccurateSteps::list_moments(std::vector<Active>& list) const {
 bool AccurateSteps::same(const std::vector<Active>& a, const std::vector<Active>& b) {
   return a.size() == b.size() &&
          std::equal(a.begin(), a.end(), b.begin(), [](const Active& p, const Active& q) {
-           return p.id == q.id && p.what == q.what && (p.slip.isZero(0) || p.slip.dot(q.slip) > 0);
+           return p.id == q.id && p.behaviour == q.behaviour &&
+                  (p.slip.isZero(0) || p.slip.dot(q.slip) > 0);
          });
 }
 
-// When an approach over this gap ends in a part of this length, and how much too early it may be
-// ended, by the speed that it has then. Forces add a t to it: gap = came t + a t^2, as a part that
-// ends there sees it. size: what the accuracy is relative to.
+// Time at which an approach over this gap ends, and how much earlier the accuracy allows it to end,
+// by its speed then. Forces add a t to the speed: gap = came t + a t^2 for a sub-step that ends
+// there. size: length that the accuracy is relative to.
 AccurateSteps::Moment AccurateSteps::moment(double gap, double came, double comes, double size,
                                             double length) const {
   gap = std::max(0.0, gap);
@@ -149,12 +153,11 @@ AccurateSteps::Moment AccurateSteps::moment(const Impact& i, double length) cons
                 length);
 }
 
-// Time of the first impact that matters. 0: now, within what the accuracy allows. Infinite: there
-// is none.
+// Time of the first impact that matters. 0: now, within the accuracy. Infinite: there is none.
 double AccurateSteps::first_impact(double length, double& at_once) const {
   double first = std::numeric_limits<double>::infinity();
   const auto take = [&](const Moment& m) {
-    if (!(m.early < length)) return;  // whenever in this part
+    if (!(m.early < length)) return;  // any time within this sub-step is early enough
     at_once = std::min(at_once, m.early);
     first = std::min(first, m.when > m.early ? (1 - 1e-3) * m.when : 0);
   };
@@ -166,39 +169,39 @@ double AccurateSteps::first_impact(double length, double& at_once) const {
   return first;
 }
 
-// When the first contact that does not do the same all over a part lifts, stops or begins to slip,
-// by straight lines: slips from where the part begins or, where they end in its first half, from
-// the part before it; forces from that. Infinite: none is known to.
+// Time at which the first contact changes its behaviour within a sub-step: lifts, stops or slips,
+// by linear interpolation. Slips start from the begin of the sub-step or, if they end in its first
+// half, from the sub-step before; forces start from that one. Infinite: none is known.
 double AccurateSteps::first_switch(double length) const {
   double first = std::numeric_limits<double>::infinity();
   const auto find = [](const std::vector<Active>& list, std::uint64_t id) -> const Active* {
     const auto found = std::find_if(list.begin(), list.end(), [&](const Active& a) {
-      return a.id == id && a.what <= Does::slips;
+      return a.id == id && a.behaviour <= Behaviour::slips;
     });
     return found != list.end() ? &*found : nullptr;
   };
   for (const Active& a : active_[1]) {
-    if (a.what > Does::slips) continue;
+    if (a.behaviour > Behaviour::slips) continue;
     const Active* past = find(past_, a.id);
     // Friction stops what slips, or has turned against what it did at the start.
     const double came = a.came.norm();
     if (came * length > kStill * stepper_.options.accuracy * a.size &&
-        (a.what == Does::sticks || a.slip.dot(a.came) > 0)) {
+        (a.behaviour == Behaviour::sticks || a.slip.dot(a.came) > 0)) {
       const double way = 2 * past_length_;
-      first = std::min(first, past != nullptr && past->what == Does::slips
+      first = std::min(first, past != nullptr && past->behaviour == Behaviour::slips
                                   ? zero_behind(-way, past->came.norm(), 0, came)
                                   : length / 4);
       continue;
     }
     const Active* then = find(active_[2], a.id);
-    const bool turns = then != nullptr && a.what == Does::slips && then->what == Does::slips &&
-                       !(then->slip.dot(a.slip) > 0);
-    if (then != nullptr && then->what == a.what && !turns) continue;
-    if (then != nullptr && a.what == Does::slips) {
+    const bool turns = then != nullptr && a.behaviour == Behaviour::slips &&
+                       then->behaviour == Behaviour::slips && !(then->slip.dot(a.slip) > 0);
+    if (then != nullptr && then->behaviour == a.behaviour && !turns) continue;
+    if (then != nullptr && a.behaviour == Behaviour::slips) {
       first = std::min(first, zero_behind(0, came, length / 2, a.speed));
       continue;
     }
-    if (past == nullptr || past->what != a.what) continue;
+    if (past == nullptr || past->behaviour != a.behaviour) continue;
     const bool lifts = then == nullptr;
     first = std::min(first, zero_behind(-past_length_ / 2, lifts ? past->force : past->margin,
                                         length / 4, lifts ? a.force : a.margin));
@@ -206,8 +209,8 @@ double AccurateSteps::first_switch(double length) const {
   return first;
 }
 
-// Difference of the halves, in the bodies, from the whole part; 1: the accuracy. It is relative to
-// the size of each body; velocities, where they are smooth, count by what they move it in the part.
+// The error: difference between the halves and the whole sub-step, in units of the accuracy,
+// relative to the size of each body. Smooth velocities count by the displacement that they cause.
 double AccurateSteps::error(double length, bool smooth) const {
   double most = 0;
   for (const int k : stepper_.motion.moving()) {
@@ -253,8 +256,7 @@ void AccurateSteps::extrapolate() {
   stepper_.motion.turn_inertias(stepper_.bodies);
 }
 
-// Takes a part in two halves, and lists what each has done. Returns whether contacts do the same as
-// in the whole part.
+// Takes a sub-step in two halves. Returns whether contacts behave as in the whole one.
 bool AccurateSteps::take_halves(double time, double length) {
   advance(time, length / 2);
   list_active(length / 2, active_[1]);
@@ -263,8 +265,7 @@ bool AccurateSteps::take_halves(double time, double length) {
   return same(active_[0], active_[1]) && same(active_[1], active_[2]);
 }
 
-// Ends a part that is accurate, and chooses the length of the next. cut: it was shorter than asked
-// for.
+// Accepts a sub-step and chooses the length of the next. cut: this one was shorter than planned.
 void AccurateSteps::accept(double time, double length, double error, bool smooth, bool cut) {
   past_ = active_[2];
   past_length_ = length / 2;
@@ -282,8 +283,8 @@ void AccurateSteps::accept(double time, double length, double error, bool smooth
   control.error = error;
 }
 
-// One part, of at most this length. Returns the length that was taken.
-double AccurateSteps::take_part(double time, double length, bool shortened, double shortest) {
+// One sub-step, of at most this length. Returns the length that was taken.
+double AccurateSteps::take_sub_step(double time, double length, bool shortened, double shortest) {
   const Tally before = stepper_.tally;
   stepper_.remember(before_);
   const auto back = [&] {
@@ -343,7 +344,7 @@ void AccurateSteps::take(double start, double length) {
     double next = control.next > 0 ? std::max(control.next, least) : left;
     const bool shortened = next > 0.5 * left;
     if (shortened) next = next < left ? left / 2 : left;
-    const double taken = take_part(start + done, next, shortened, least);
+    const double taken = take_sub_step(start + done, next, shortened, least);
     done = taken < left ? done + taken : length;
   }
 }

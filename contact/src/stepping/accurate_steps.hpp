@@ -8,9 +8,10 @@
 
 namespace tether::contact::detail {
 
-/// method, section 7. Each part is taken whole and in two halves. Where contacts do the same in all
-/// three, 2 halves - whole is of order 2 (Deuflhard's extrapolation of the Euler step); else the
-/// halves are kept. Lengths by H211b (Soederlind, Digital filters in adaptive time-stepping, 2003).
+/// Error-controlled steps (method, section 7.1). Each sub-step is taken whole and in two halves. If
+/// contacts behave alike in all three, 2 halves - whole is of order 2 (Deuflhard's extrapolation of
+/// the Euler step); else the halves are kept. Lengths by H211b (Soederlind, Digital filters in
+/// adaptive time-stepping, 2003).
 class AccurateSteps {
  public:
   AccurateSteps(SubStepper& stepper, StepHalving& halving) : stepper_(stepper), halving_(halving) {}
@@ -20,22 +21,30 @@ class AccurateSteps {
   StepperMemory::Control control;  ///< how the next step goes on
 
  private:
-  enum class Does : std::uint8_t { sticks, slips, strikes, rolls, rolls_not, spins, spins_not };
-  /// Record of a contact, a law of a joint or a moment: what it has done in a part.
+  enum class Behaviour : std::uint8_t {
+    sticks,
+    slips,
+    strikes,
+    rolls,
+    rolls_not,
+    spins,
+    spins_not
+  };
+  /// Behaviour of a contact, a law of a joint or a moment in a sub-step.
   struct Active {
     std::uint64_t id;
-    Does what;
+    Behaviour behaviour;
     Eigen::Vector3d slip;  // impulse, or moment, against it
-    // Values of a contact: normal force and what is left of the cone, means of the part; its slip
-    // where the part begins, and how fast it is where it ends.
+    // A contact's mean normal force and mean distance from the cone; speed of slip at the end;
+    // size.
     double force = 0, margin = 0, speed = 0, size = 0;
-    Eigen::Vector3d came = Eigen::Vector3d::Zero();
+    Eigen::Vector3d came = Eigen::Vector3d::Zero();  // slip at the start
   };
   struct Moment {
     double when, early;  // s
   };
   void advance(double time, double length);
-  double take_part(double time, double length, bool shortened, double shortest);
+  double take_sub_step(double time, double length, bool shortened, double shortest);
   bool take_halves(double time, double length);
   void accept(double time, double length, double error, bool smooth, bool cut);
   Moment moment(double gap, double came, double comes, double size, double length) const;
@@ -51,9 +60,9 @@ class AccurateSteps {
 
   SubStepper& stepper_;
   StepHalving& halving_;
-  BodiesState before_, whole_;  // a part: before it, and after it whole
+  BodiesState before_, whole_;  // a sub-step: before it, and after it whole
   std::array<std::vector<Active>, 3> active_;
-  // Contacts of the second half of the part before this one, in the same step; its length.
+  // Contacts of the second half of the sub-step before this one, in the same step; its length.
   std::vector<Active> past_;
   double past_length_ = 0;
 };

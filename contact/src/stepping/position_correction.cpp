@@ -15,7 +15,7 @@ namespace {
 
 using linalg::at;
 
-// By velocities that are not kept.
+// Moves a body by velocities that are not added to its own.
 void shift(BodySet& bodies, int body, double dt, const Vector3d& v, const Vector3d& w) {
   bodies.position[at(body)] += dt * v;
   if (!w.isZero(0))
@@ -32,12 +32,12 @@ PositionCorrection::PositionCorrection(const SteppingOptions& options, IslandMak
       closing_solver_(closing_options(options), maker, LawUse::closing),
       solver_(correction_options(options), maker, LawUse::limits) {}
 
-// Velocity at which a contact may close, or, negative, at which it has to open.
+// Largest speed at which a contact may close; negative: least speed at which it has to open.
 double PositionCorrection::bias(double gap, double dt) const {
   return gap > 0 ? gap / dt : std::max(error_reduction_ * gap / dt, -max_speed_);
 }
 
-// Islands where nothing bounces and an impact leaves its gap open. False: there are none.
+// Marks islands without restitution in which an impact leaves its gap open. False: there are none.
 bool PositionCorrection::find_closing(const Impacts& impacts, const StepContacts& contacts,
                                       const BodySet& bodies) {
   closing_.clear();
@@ -60,8 +60,8 @@ bool PositionCorrection::find_closing(const Impacts& impacts, const StepContacts
   return true;
 }
 
-// Impulses start as the first solve has found them, but where a gap is left, which takes its part
-// of the approach.
+// Impulses start from those of the velocity solve; where a gap is left, from the part of them that
+// remains after the gap has taken its share of the approach.
 void PositionCorrection::solve_closing(const Impacts& impacts, double dt,
                                        const StepContacts& contacts) {
   part_.assign(contacts.points.size(), 1);

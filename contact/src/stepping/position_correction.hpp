@@ -15,15 +15,14 @@ class PositionCorrection {
  public:
   PositionCorrection(const SteppingOptions& options, IslandMaker* maker);
 
-  /// After the solve of velocities. An impact that does not bounce takes all of the approach at
-  /// once and would leave its gap open. Positions of its island move as if it only stopped the
-  /// approach at the surface (bias gap / dt); what they move more or less than the velocities is no
-  /// velocity. Penetrations of such islands are taken back in the same solve.
+  /// Called after the solve of velocities. An impact without restitution stops the approach at once
+  /// and would leave its gap open. The positions of its island move as if the approach ended at the
+  /// surface (bias gap / dt); this displacement is applied to positions only. Penetrations of such
+  /// islands are reduced in the same solve.
   void close_gaps(const Impacts& impacts, double dt, const StepContacts& contacts,
                   const std::vector<int>& moving, BodySet& bodies);
-  /// The least move (in the metric of the masses) that takes penetrations deeper than `negligible`
-  /// back; contacts that are open may close by as much as they are open. Islands whose gaps have
-  /// just been closed are left out.
+  /// The least displacement, in the metric of the masses, that reduces penetrations deeper than
+  /// `negligible`; open contacts may close. Islands whose gaps have just been closed are left out.
   void take_back(double deepest, double negligible, double dt, const StepContacts& contacts,
                  const std::vector<int>& moving, BodySet& bodies);
 

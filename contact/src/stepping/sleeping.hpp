@@ -30,19 +30,19 @@ class Sleeping {
   /// Whether those asleep have changed since the last call.
   bool take_changed() { return std::exchange(changed_, false); }
 
-  /// After the forces of a part, before joints and contacts: wakes islands whose forces or
+  /// After the forces of a sub-step, before joints and contacts: wakes islands whose forces or
   /// neighbours have changed, holds the others, and presses on their neighbours.
   void hold(const std::vector<RigidBody>& coming, double dt, BodySet& bodies);
   /// After contacts are found. True: something is about to touch an island, which is awake now: the
-  /// part begins anew. Else contacts of bodies asleep are left out.
+  /// sub-step begins anew. Else contacts of bodies asleep are left out.
   bool wake_touched(const NearContacts& near, const BodySet& bodies, const Impacts& impacts,
                     double dt, StepContacts& contacts);
   void leave_out(StepContacts& contacts) const;
-  /// At the end of a part whose problem is solved, before end(): who falls asleep.
+  /// At the end of a sub-step whose problem is solved, before end(): who falls asleep.
   void fall_asleep(double dt, BodySet& bodies, const StepContacts& contacts);
   /// Bodies asleep are where they were to the last bit; adds their contacts.
   void end(double dt, BodySet& bodies, StepContacts& contacts) const;
-  /// Impulses in a part of length dt of contacts that have woken since the last call.
+  /// Impulses in a sub-step of length dt of contacts that have woken since the last call.
   WarmStart take_woken(double dt);
 
   void wake_everybody();

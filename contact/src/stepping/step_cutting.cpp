@@ -11,7 +11,8 @@ using linalg::at;
 
 namespace {
 
-// A solver that had nothing to solve in between still has what it had before.
+// Adds the impulses of `from` for contacts that `to` does not have: a solver that had nothing to
+// solve in between keeps its warm start.
 void add_missing(const WarmStart& from, WarmStart& to) {
   std::vector<std::uint64_t> known = to.ids;
   std::sort(known.begin(), known.end());
@@ -41,8 +42,8 @@ void append(const StepContacts& from, StepContacts& to) {
 
 }  // namespace
 
-// Islands that were taken apart and have met are taken again, together: what that has cost of what
-// cuts may cost is spent.
+// Takes the islands that strike apart from the others. If they meet, the step is repeated with all
+// islands together; the cost counts against what cuts may cost.
 int StepCutting::take(const SubStep& s) {
   if (s.within != SubStep::Within::step) return take_islands(s);
   const auto begin = [&] {
@@ -67,7 +68,7 @@ int StepCutting::take(const SubStep& s) {
   return left;
 }
 
-// Bodies that the islands that strike do not touch move as in a step without cuts.
+// Cuts the step of the striking islands only; all other bodies move as in a step without cuts.
 int StepCutting::take_islands(const SubStep& s) {
   std::vector<char> striking;
   if (s.within != SubStep::Within::cut_by_islands ||
@@ -85,7 +86,7 @@ int StepCutting::take_islands(const SubStep& s) {
   return take_others(start, striking, some);
 }
 
-// The same length of those that nothing has struck, whole; islands that strike later are cut there.
+// Takes the other bodies over the whole length; it is cut again where islands of theirs strike.
 int StepCutting::take_others(const StepMark& start, const std::vector<char>& striking,
                              const SubStep& s) {
   BodySet& bodies = stepper_.bodies;
@@ -132,7 +133,7 @@ int StepCutting::take_striking(const SubStep& s) {
   return left;
 }
 
-// With impulses of a sub-step of this length.
+// Takes one side of a cut; `length` is that of the sub-step whose impulses the warm start has.
 int StepCutting::take_side(const SubStep& s, SubStep::Side side, double length) {
   SubStep part = s;
   part.side = side;
@@ -142,8 +143,8 @@ int StepCutting::take_side(const SubStep& s, SubStep::Side side, double length) 
   return left;
 }
 
-// The sub-step up to the impact; once more where bodies that turn were off the surface by then.
-// Returns its length.
+// The sub-step up to the impact. It is repeated with a corrected length if turning bodies are off
+// the surface at its end. Returns its length.
 double StepCutting::approach(const SubStep& s) {
   const WarmStart start = stepper_.solver->warm_start();
   const Tally before = stepper_.tally;
@@ -167,8 +168,7 @@ double StepCutting::approach(const SubStep& s) {
   return when;
 }
 
-// The impact, at the places where bodies are. Unsolved: what follows takes it as a step that is not
-// cut does.
+// The impact at the present positions. Unsolved: the rest of the step takes it as without a cut.
 StepCutting::Struck StepCutting::strike() {
   SubStepper& s = stepper_;
   s.near->find(s.bodies, s.now.length, s.contacts);
@@ -187,7 +187,7 @@ StepCutting::Struck StepCutting::strike() {
   return Struck::impact;
 }
 
-// Solves the impact of the contacts, which touch. False: it is not solved, and nothing has changed.
+// Solves the impact of the touching contacts. False: not solved, and nothing has changed.
 bool StepCutting::take_impact() {
   SubStepper& s = stepper_;
   if (s.bounces_at_once)
@@ -204,8 +204,8 @@ bool StepCutting::take_impact() {
   return true;
 }
 
-// Contacts that approach strike alone; those that this makes approach are next. What is left after
-// very many turns, as where bodies rattle between two others, strikes together.
+// Approaching contacts strike alone; then those that this makes approach. After kMostTurns, as with
+// bodies that rattle between two others, the remaining ones strike together.
 bool StepCutting::take_impacts_in_turn() {
   constexpr int kMostTurns = 2000;
   SubStepper& s = stepper_;

@@ -8,8 +8,9 @@
 
 namespace tether::contact::detail {
 
-/// Takes a sub-step up to the impact that StepCuts has chosen, the impact itself, and the rest; of
-/// the islands that strike, while the others take it whole. Impulses are those of all of these.
+/// Takes a sub-step in three parts: up to the impact that StepCuts has chosen, the impact, the
+/// rest. This holds for the islands that strike; others take it whole. Impulses are sums over the
+/// parts.
 class StepCutting {
  public:
   /// Takes a sub-step, and returns how many cuts are left.

@@ -5,8 +5,8 @@ namespace tether::contact::detail {
 
 namespace {
 
-// w^2 of what joints hold goes with the ratio of load and link, and with the shock where a slack
-// chain snaps taut: each halving allows four times as much.
+// The vibration w^2 of loads on joints grows with the mass ratio of load and link, and with the
+// shock of a slack chain that snaps taut. Each halving allows four times as much.
 constexpr int kJointHalvings = 20;
 
 }  // namespace

@@ -6,8 +6,8 @@
 
 namespace tether::contact::detail {
 
-/// Takes a sub-step in two halves, and these in halves, where its problem is not solved or its
-/// joints are not met; and has it cut where an impact is on the way.
+/// Takes a sub-step, in halves, quarters, ... if its contact problem is not solved or its joints
+/// are not met. An impact within it cuts it (StepCutting).
 class StepHalving {
  public:
   explicit StepHalving(SubStepper& stepper)

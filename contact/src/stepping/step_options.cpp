@@ -59,7 +59,7 @@ BodyOptions patient_options(const SteppingOptions& o) {
   return b;
 }
 
-// Penetrations need not vanish in one step: a rough answer is good enough, as the next step sees
+// A penetration need not vanish in one step, so a rough solution suffices: the next step reduces
 // what is left.
 BodyOptions correction_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
@@ -75,9 +75,9 @@ double negligible_depth(const SteppingOptions& o, double dt) {
   return o.gravity ? o.tolerance * o.gravity->norm() * dt * dt : 0;
 }
 
-// Gaps are closed by positions only: an error of the approach is so much of its way in the step,
-// and the next step sees it as a gap or a penetration. A few sweeps do; small islands, which are
-// cheap, are solved, so that a stack that lands does not depend on the order of its boxes.
+// Closing gaps changes positions only, and the next step corrects an error as a gap or a
+// penetration. A few sweeps therefore suffice. Small islands are solved, which is cheap, so that
+// the result for a landing stack does not depend on the order of its boxes.
 BodyOptions closing_options(const SteppingOptions& o) {
   BodyOptions b = contact_options(o);
   b.min_sweeps = 0;

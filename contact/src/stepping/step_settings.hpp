@@ -5,12 +5,11 @@
 
 namespace tether::contact::detail {
 
-/// Parts of the largest velocity that a contact needs. Where the tolerance is not met a better
-/// answer than `kEnough` is worth no more than 3/4 of max_work, and than `kGood` none of what
-/// is added to max_work where a shorter step would not help. Answers within `kUseful` are as good
-/// as the step: it moves bodies by velocities of its end, an error of half of what it changes them
-/// by, while one contact is off by so much in a problem that is not solved. Where anything is
-/// accepted the shortest parts, which nothing makes easier any more, are used within `kLast`.
+/// Errors relative to the velocity scale (method, section 3.1) at which a step stops a solve that
+/// does not reach the tolerance. kEnough ends it after 3/4 of max_work. kGood ends it where more
+/// work is allowed because a shorter step would not help. kUseful is the largest error that is ever
+/// accepted: it is still below the error of the step, which moves bodies by their final velocities.
+/// kLast is accepted in the shortest sub-steps, where anything above the tolerance is.
 constexpr double kEnough = 1e-6, kGood = 1e-4, kLast = 1e-3, kUseful = 1e-2;
 
 /// Throws std::invalid_argument.

@@ -10,13 +10,13 @@
 
 namespace tether::contact::detail {
 
-/// Length of time that is taken at once or, where that fails, in sub-steps of its own.
+/// A span of time that is taken at once or, if that fails, in shorter sub-steps.
 struct SubStep {
   double start = 0, length = 0;  ///< s
-  /// Halvings that are left, where its contact problem is not solved and where its joints cannot be
-  /// met; and cuts at impacts.
+  /// Remaining halvings for unsolved contact problems and for joints that are not met; remaining
+  /// cuts at impacts.
   int halvings = 0, joint_halvings = 0, cuts = 0;
-  /// A step that is cut may have its islands apart from each other, or not.
+  /// Whether it is a whole step or lies within a cut one, taken island by island or for all bodies.
   enum class Within : std::uint8_t { step, cut_by_islands, cut } within = Within::step;
   /// Its place in a cut: up to the impact, or after it.
   enum class Side : std::uint8_t { none, approach, rest } side = Side::none;
@@ -31,12 +31,12 @@ struct SubStep {
   bool has(int body) const { return active == nullptr || (*active)[linalg::at(body)] != 0; }
 };
 
-/// Why a sub-step ends before its last stage, if it does: its problem, its joints, an impact on the
-/// way, or a body that has woken. Nothing has moved then.
+/// How a sub-step ended: whole, or early without having moved anything. Early: contact problem
+/// unsolved, joints unmet, an impact to cut at, a body woken.
 enum class SubStepEnd : std::uint8_t { whole, unsolved, unmet, cut, woken };
 
-/// How the contact problems of a step have ended, the worst of its sub-steps, and how many. One
-/// that is taken again is judged as if it had not been taken before.
+/// Outcome of the contact problems of a step: the worst of its sub-steps, and counts. Restored when
+/// the same sub-step is taken again.
 struct Tally {
   Status status = Status::solved;
   bool succeeded = true, joints_met = true;

@@ -26,8 +26,8 @@ void SubStepper::leave_out_joined() {
   });
 }
 
-// Islands were apart when they were chosen: bodies that an impact has sent to others must take
-// their step with them.
+// Leaves out contacts of bodies that do not take part. If one of them touches a body that does,
+// their islands have met since they were separated, and the step has to be taken for both together.
 void SubStepper::leave_out_passive() {
   if (now.active == nullptr) return;
   const auto waits = [&](int i) { return bodies.mass[at(i)] > 0 && !now.has(i); };
@@ -40,8 +40,8 @@ void SubStepper::leave_out_passive() {
   });
 }
 
-// Before an impact its contacts are left out, so that nothing of it is taken: how far forces of
-// other contacts let them go by then differs from where they touch by the square of the length.
+// In the sub-step before an impact its contacts are left out, so that they carry no impulse yet.
+// Other contacts change where the gaps close by the square of the length only.
 void SubStepper::find_contacts() {
   if (options.team) options.team->place(bodies.position);
   near->find(bodies, now.length, contacts);
@@ -58,8 +58,9 @@ void SubStepper::find_contacts() {
   tally_before = tally;
 }
 
-// Gaps that rounding leaves differ from contact to contact, and where bodies rest on more contacts
-// than they need no velocities have them all: in gap / dt they would choose who carries the load.
+// Gaps of the size of rounding count as closed. They differ from contact to contact, and bodies on
+// more contacts than they need cannot close all of them: with gap / dt, rounding would decide which
+// contacts carry the load.
 void SubStepper::set_gaps() {
   for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
     const double gap = contacts.gaps[k];
@@ -71,15 +72,15 @@ void SubStepper::set_gaps() {
   }
 }
 
-// Impacts; and, where anything bounces, contacts that are slow at the start of the sub-step, or
-// that bodies leave and fall back to, but that an impact closes in it; or later, though the problem
-// of the sub-step would hold them where they are above it.
-void SubStepper::look_for_cut() {
+// Chooses the impact at which the sub-step is cut. Candidates are the impacts and, with
+// restitution, contacts whose gap closes within the sub-step though they are slow at its start, and
+// contacts that would separate and fall back.
+void SubStepper::choose_cut() {
   const std::vector<Impact>& chosen = impacts->list();
   if (now.cuts == 0 || !(restitution || !chosen.empty()) || !cuts->may_cut(contacts.points.size()))
     return;
   approaches.clear();
-  approaches.reserve(contacts.points.capacity());  // no more often than contacts do
+  approaches.reserve(contacts.points.capacity());  // allocates no more often than the contacts
   const auto fall = [&](const PointContact& c) {
     const double apart = options.gravity ? now.length * c.normal.dot(*options.gravity) : 0;
     return (motion.falls(c.second) ? apart : 0) - (motion.falls(c.first) ? apart : 0);
@@ -116,7 +117,7 @@ void SubStepper::solve_problem() {
   counts.assembled_islands += solution.assembled_islands;
 }
 
-// No contact closes by the velocities that bodies have: there is nothing to solve.
+// Whether no contact closes with the present velocities, so that there is nothing to solve.
 bool SubStepper::nothing_presses() const {
   for (const PointContact& c : contacts.points)
     if (normal_velocity(bodies.motion, c) + c.bias < 0) return false;
@@ -152,8 +153,8 @@ void SubStepper::solve_contacts() {
   if (rolling) contacts.moments = joints ? joints->moments() : rolling->moments();
 }
 
-// Whether a shorter step would not help: there is none, or there is an impact. What an impact takes
-// does not hang on the length of the step. Who accepts nothing gets the shorter steps even so.
+// Whether a shorter sub-step would not help: none is allowed, or there is an impact, whose impulse
+// does not depend on the length. With acceptance 1 shorter ones are tried all the same.
 bool SubStepper::shortest() const {
   const bool impact = options.acceptance > 1 && !impacts->list().empty();
   return options.max_halvings > 0 && (now.halvings == 0 || impact);
@@ -183,8 +184,9 @@ void SubStepper::take_later_impacts() {
   tally.bounces += taken.bounces;
 }
 
-// Bodies that impacts have sent where their velocities before did not take them: with what they
-// would go into, the problem is solved again. What is left after three times the next step sees.
+// An impact may send a body towards others that its earlier velocity did not reach. The contacts
+// with them are added and the problem is solved again, three times at most; the next step finds the
+// rest.
 void SubStepper::meet_others() {
   for (int again = 0; again < 3 && !failed; ++again) {
     const std::size_t before = contacts.points.size();
@@ -224,7 +226,7 @@ void SubStepper::end_sleep() {
   sleeping->end(now.length, bodies, contacts);
 }
 
-// In parts, where their equations have no solution near the start of the iteration.
+// Joint impulses for the end of the sub-step; if the iteration finds none, the sub-step is halved.
 void SubStepper::predict_joints() {
   if (!joints_active) return;
   if (joints->predict(bodies, now.start, now.length) && resolves_joints()) return;

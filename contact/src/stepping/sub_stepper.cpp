@@ -21,7 +21,7 @@ namespace {
 // contract by (w dt)^2.
 constexpr double kResolved = 1;
 
-// Refuses by name what it does not go with.
+// Throws std::invalid_argument on options that rolling friction does not go with.
 void check_rolling(const SteppingOptions& options) {
   if (options.law != Law::coulomb)
     throw std::invalid_argument(
@@ -140,7 +140,7 @@ void SubStepper::make_stages() {
   if (near) {
     add_stage("collision", &S::find_contacts);
     add_stage(impact, &S::choose_impacts);
-    if (cuts) add_stage(impact, &S::look_for_cut);
+    if (cuts) add_stage(impact, &S::choose_cut);
     if (restitution) add_stage("restitution", &S::choose_bounces);
     add_stage("contact", &S::solve_contacts);
     if (restitution) add_stage("restitution", &S::rebound);

@@ -24,8 +24,8 @@ namespace tether::contact::detail {
 
 class RollingPart;
 
-/// A sub-step is a list of stages, made once from the options and the bodies. What else may be done
-/// where one cannot be taken at once is decided around it: StepHalving, StepCutting, AccurateSteps.
+/// Takes one sub-step: a list of stages, made once from the options and the bodies. StepHalving,
+/// StepCutting and AccurateSteps decide about shorter sub-steps.
 struct SubStepper {
   struct Stage {
     const char* effect;
@@ -41,7 +41,7 @@ struct SubStepper {
   void add_force(const char* effect, Force force);
   /// Before forces.
   void add_joints(std::unique_ptr<JointPart> part);
-  /// New ones: nothing of the past is left.
+  /// New solvers, without warm starts.
   void make_solvers();
 
   /// The sub-step that is taken, or what it consists of.
@@ -56,8 +56,7 @@ struct SubStepper {
   StepMark mark() const;
   void go_back(const StepMark& mark);
 
-  /// Contacts that are found and take no part: of bodies that a joint connects, and of bodies that
-  /// wait.
+  /// Remove contacts of bodies that a joint connects, and of bodies that do not take part.
   void leave_out_joined();
   void leave_out_passive();
 
@@ -109,7 +108,7 @@ struct SubStepper {
 
   void find_contacts();
   void set_gaps();
-  void look_for_cut();
+  void choose_cut();
   void choose_bounces();
   void solve_contacts();
   void take_later_impacts();

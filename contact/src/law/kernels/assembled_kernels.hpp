@@ -124,12 +124,12 @@ TETHER_INLINE Norms natural_map(const View& s, const PackedVector* x, PackedVect
   return {std::sqrt(map), std::sqrt(xx), std::sqrt(ww)};
 }
 
-// Largest error of a contact, relative to the velocity scale of its island; infinite if one is not
-// a number. The error of a contact: with theta contacts in its row, what |theta D (x_i - z)| is for
-// the block solution z of theta D and theta D x_i - w, and how far x_i is outside of the cone,
-// times theta A_nn; in `least` error_as_it_is where that is less. Solutions do not depend on theta;
-// with it a contact that is given twice, with half the impulse each, has the same error. It is at
-// least -w_n: z_n > x_n where w_n < 0.
+// The largest error of a contact, relative to the velocity scale of its island; infinite if one is
+// not a number (method, section 3.1). The error of a contact with theta contacts in its row is the
+// larger one of |theta D (x_i - z)|, z the block solution for theta D and theta D x_i - w, and
+// theta A_nn times the distance of x_i from the cone. `least` has backward_error() instead, where
+// that is less. Solutions do not depend on theta; a contact that is given twice has the error of
+// one. The error is at least -w_n, since z_n > x_n where w_n < 0.
 template <class Rule>
 TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
   int count = 0;
@@ -160,7 +160,7 @@ TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
     if (error > least) {
       double gamma[2];
       Rule::gamma(s.rule, i, L, gamma);
-      double own = scale * error_as_it_is(L, Rule::kFriction ? L.mu : 0, gamma, xi, w);
+      double own = scale * backward_error(L, Rule::kFriction ? L.mu : 0, gamma, xi, w);
       own = outside > own ? outside : own;
       own = own < error ? own : error;
       least = least > own ? least : own;

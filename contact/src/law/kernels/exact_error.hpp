@@ -8,10 +8,10 @@
 
 #include "law/interface/law.hpp"
 
-// Between light and heavy bodies the terms of A x - b are 1e6 times larger than what they leave.
-// Their double sum is off by up to as many units u |A| |x| as it has terms, D x_i - w_i and the
-// block solution by as many again, times the contacts of the row. x itself costs one unit. These
-// sums are long doubles, and x_i - z_i is found as such, not as a difference of rounded points.
+// With large mass ratios the terms of A x - b nearly cancel. A sum of doubles is off by up to one
+// unit u |A| |x| for each of its terms, and so are D x_i - w_i and the block solution; the rounding
+// of x itself causes one unit only. Sums here are long doubles, and x_i - z_i is computed as a
+// correction, not as a difference of rounded points.
 
 namespace tether::contact::detail {
 namespace {
@@ -36,9 +36,9 @@ inline void wide_block(const LocalBlock& L, const Wide* v, Wide* out) {
   out[2] = L.c[1] * v[0] + L.T[1] * v[1] + L.T[2] * v[2];
 }
 
-// A rounded sliding solution z made exact by Newton's method for
+// Refines a rounded sliding solution z by Newton's method for
 //   (w + D d)_n = 0,  |z_t| = mu z_n,  (w + D d)_t parallel to z_t/|z_t| + gamma,  d = z - x;
-// left as it is where that is not a small correction.
+// z stays if the correction is not small.
 inline void refine_sliding(const LocalBlock& L, const double* gamma, const Wide* w, const Wide* x,
                            Wide* z) {
   constexpr int kRefinements = 2;
@@ -83,15 +83,14 @@ inline void wide_rhs(const LocalBlock& L, const Wide* x, const Wide* w, double* 
   for (int c = 0; c < 3; ++c) b[c] = static_cast<double>(f[c] - w[c]);
 }
 
-// Backward error: the smallest change of b for which x is exact in its regime (method, 3.3). It
-// counts if a strongly coupled contact comes to the brink of sliding, or two of its sliding
-// solutions merge: a last bit of b further, other solutions are far away. |w| for x at rest within
-// its cone; for its point p on the cone at the same x_n, |w - D (x - p) - slip against p_t| +
-// |D (x - p)|. Infinite without friction, for jams, b_n <= 0, under a law (gamma) that has none,
-// and below half of the e up to which contacts have one solution (method, section 2), which is then
-// near.
+// Backward error: a bound on the smallest change of b for which x is exact in its regime (method,
+// section 3.3). Inside the cone it is |w|; with p the point of the cone at the same x_n it is
+// |w - D (x - p) - slip against p_t| + |D (x - p)|. It matters at strongly coupled contacts near
+// the brink of sliding, or where two sliding solutions merge: there the last bit of b decides
+// between distant solutions. Infinite where it does not serve: without friction; for jams (b_n <=
+// 0) under a law that has none; and for e below half the bound of uniqueness (method, section 2.4).
 template <class Real>
-TETHER_INLINE Real error_as_it_is(const LocalBlock& L, double mu, const double* gamma,
+TETHER_INLINE Real backward_error(const LocalBlock& L, double mu, const double* gamma,
                                   const Real* x, const Real* w) {
   const Real none = std::numeric_limits<Real>::infinity();
   const bool may_jam = gamma[0] == 0 && gamma[1] == 0;
@@ -114,8 +113,9 @@ TETHER_INLINE Real error_as_it_is(const LocalBlock& L, double mu, const double* 
   return t > most || on_cone < rest ? on_cone : rest;
 }
 
-// |D (x - z)|, or the above if that is less, or A_nn times what x is outside of its cone; z: block
-// solution in doubles, mu: 0 where the law has no friction.
+// The error of a contact: the smaller one of |D (x - z)| and the backward error, but at least A_nn
+// times the distance of x from its cone. z: block solution in doubles; mu: 0 under a law without
+// friction.
 inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, const Wide* x,
                        const Wide* w, const double* z, Regime regime) {
   Wide f[3] = {w[0], w[1], w[2]};
@@ -132,11 +132,12 @@ inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, cons
   const Wide t = std::sqrt(x[1] * x[1] + x[2] * x[2]);
   const Wide outside = L.a * std::max(t - mu * x[0], -x[0]);
   Wide error = std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
-  if (regime != Regime::sticking) error = std::min(error, error_as_it_is(L, mu, gamma, x, w));
+  if (regime != Regime::sticking) error = std::min(error, backward_error(L, mu, gamma, x, w));
   return std::max(error, outside);
 }
 
-// worst_error() (assembled_kernels.hpp) with that; null, or the errors of all contacts.
+// worst_error() (assembled_kernels.hpp) with long sums. each: receives the errors of all contacts,
+// or null.
 template <class Rule>
 double exact_error(const View& s, const PackedVector* x, double* each) {
   int count = 0;

@@ -49,15 +49,15 @@ class StepCuts {
 
   StepCuts(const BodyOptions& options, IslandMaker* maker);
   /// Islands of these bodies are not cut, nor are those with rolling friction: laws of joints, and
-  /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the part
-  /// after them: they need no laws.)
+  /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the
+  /// sub-step after them: they need no laws.)
   void set_laws(const JointPart& joints) { laws_ = &joints; }
   /// Adds what a step may spend; called in each step.
   void earn() { kept_ = std::min(kept_ + kShare, kMostKept); }
   double kept() const { return kept_; }
   void set_kept(double kept) { kept_ = kept; }
 
-  /// Which contacts have pressed in the part before: of its solve.
+  /// Which contacts have pressed in the sub-step before: of its solve.
   void remember(const WarmStart& solved);
   /// Whether a step of so many contacts may be cut.
   bool may_cut(std::size_t contacts) const {
@@ -72,7 +72,7 @@ class StepCuts {
   bool find_striking(const BodySet& bodies, const StepContacts& contacts,
                      const std::vector<int>& moving, const std::vector<char>& falls,
                      const SubStep& now, std::vector<char>& striking);
-  /// From the start of the part to the impact, s; all of it: none before its end.
+  /// From the start of the sub-step to the impact, s; all of it: none before its end.
   double when() const { return when_; }
   bool strikes(const PointContact& c) const;
   /// There: how much later, s, the first of what strikes touches by the speed that it has then.
