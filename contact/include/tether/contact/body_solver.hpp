@@ -43,7 +43,7 @@ struct BodyOptions {
   /// velocity that a contact of its island needs.
   double tolerance = 1e-6;
   /// Sweeps over one island, at most; more only where they are forecast to cost less than the
-  /// assembled problem. They end before where `max_work` is spent and they no longer get on. An
+  /// assembled problem. They end before where `max_work` is spent and progress has ended. An
   /// island that needs more and is not assembled ends with the best iterate found.
   int max_sweeps = 200000;
   /// Sweeps before an island of more than 64 contacts may be called solved. The tolerance is

@@ -125,13 +125,13 @@ struct SteppingOptions {
   double tolerance = 1e-9;
   /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
   /// residual is at most min(acceptance * tolerance, 1e-2) (method, section 7). Below 1e-6 the
-  /// solver stops after 3/4 of max_work. 1: nothing above the tolerance is
-  /// accepted.
+  /// solver stops after 3/4 of max_work. 1: nothing above the tolerance
+  /// is accepted.
   double acceptance = 1;
   /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,
   /// and so on, at most this many times. The shortest sub-steps, and those with an impact (which a
   /// shorter step does not make easier), accept residuals up to 1e-4 at least. They do so after
-  /// five times max_work where needed, and if acceptance > 1 up to 1e-3 then. A shortest part above
+  /// five times max_work where needed, and if acceptance > 1 up to 1e-3 then. A shortest one above
   /// that is used all the same and counted as `unsolved`. 0: no halving.
   int max_halvings = 0;
   Gyroscopic gyroscopic = Gyroscopic::momentum;  ///< of bodies that are no spheres
@@ -179,7 +179,7 @@ struct SteppingOptions {
 /// Largest residual of a contact problem that is used: see SteppingOptions::acceptance.
 double accepted_residual(const SteppingOptions& options);
 
-/// Contacts of the last step (of its last part, where it was taken in parts), side by side.
+/// Contacts of the last step (of its last sub-step, if it had several), side by side.
 struct StepContacts {
   std::vector<PointContact> points;       ///< id: see contact_id
   std::vector<double> gaps;               ///< m, at the start of the step
@@ -203,8 +203,8 @@ struct StepCounts {
   long bounces = 0;   ///< contacts that got an impulse of restitution
   long accepted = 0;  ///< problems above the tolerance that were accepted
   long halved = 0;    ///< steps and sub-steps that were taken in two halves
-  long parts = 0;     ///< with an accuracy: parts that steps were taken in
-  long rejected = 0;  ///< and parts that were not accurate enough, or had an impact on the way
+  long parts = 0;     ///< with an accuracy: sub-steps that steps were taken in
+  long rejected = 0;  ///< and sub-steps that were not accurate enough, or had an impact on the way
   long unsolved = 0;  ///< problems that were used though above what is accepted
 };
 
@@ -311,23 +311,23 @@ class Stepper {
   /// axes, N m s. Empty unless a meeting names either.
   const std::vector<Eigen::Vector3d>& contact_moments() const;
   double penetration() const;  ///< deepest at the start of the last step, m
-  double residual() const;     ///< of its contact problem, the largest of its parts
-  /// Status of the last step's contact problem, the worst of its parts; solved without contacts.
+  double residual() const;     ///< of its contact problems, the largest
+  /// The worst status of the last step's contact problems; solved without contacts.
   Status status() const;
-  /// True if the contact problems of all parts of the last step were solved or accepted, and its
-  /// end meets the joints.
+  /// True if all contact problems of the last step were solved or accepted, and its end meets the
+  /// joints.
   bool succeeded() const;
   /// False: the end of the last step does not meet the joints.
   bool joints_met() const;
   /// Largest |g| of a joint's rows at the end of the last step, m or rad; 0 without joints.
   double joint_drift() const;
-  /// Impulses of the joints in the last part of the last step, one for each row, N s or N m s.
+  /// Impulses of the joints in the last sub-step, one for each row, N s or N m s.
   /// Dependent rows get those of least norm, each row measured by |G C| with C C' the inverse mass:
   /// equal rows get equal shares.
   const std::vector<double>& joint_impulses() const;
   /// Those of the laws of joints, as JointEquations::add_laws has added them.
   const std::vector<double>& law_impulses() const;
-  /// Length, s, of the last part of the last step, which impulses are of: forces are impulses over
+  /// Length, s, of the last sub-step, to which the impulses belong: forces are impulses over
   /// it. 0 before the first step, and after set_memory().
   double last_part() const;
   int asleep() const;                      ///< bodies that sleep

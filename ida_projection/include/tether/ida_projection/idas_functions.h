@@ -14,13 +14,13 @@ extern "C" {
 /** @file
  * As in <idas/idas.h>, which repeats typedefs of <ida/ida.h> and so is not included beside it. */
 
-/** Of IDAS. */
+/** A function of IDAS. */
 int IDASetNonlinearSolverSensStg(void* ida_mem, SUNNonlinearSolver NLS);
-/** Of IDAS. */
+/** A function of IDAS. */
 int IDAGetNonlinearSystemDataSens(void* ida_mem, sunrealtype* tcur, N_Vector** yySpred,
                                   N_Vector** ypSpred, N_Vector** yySn, N_Vector** ypSn,
                                   sunrealtype* cj, void** user_data);
-/** Of IDAS. */
+/** A function of IDAS. */
 int IDAGetSensNumLinSolvSetups(void* ida_mem, long int* nlinsetupsS);
 
 /** The library links neither IDA nor IDAS (same symbols, other memory layouts), and a host with IDA

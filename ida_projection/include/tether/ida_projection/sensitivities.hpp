@@ -11,7 +11,7 @@ TETHER_EXPORT_BEGIN
 namespace tether::ida_projection {
 
 /// From g(t, y, p) = 0 follows C s_k + dg/dp_k = 0 for the sensitivities s_k = dy/dp_k, C = dg/dy.
-/// How dg/dp_k is had: by a function, by differences of g in p, or, where neither is given, it is
+/// How dg/dp_k is found: by a function, by differences of g in p, or, where neither is given, it is
 /// zero.
 struct Sensitivities {
   int count = 0;  ///< Ns of IDASensInit

@@ -62,9 +62,9 @@ struct SpringForce {
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();  ///< ends, m
 };
 
-/// Forces at Engine::time(). In stepping they are means over the last step (its last part, where it
-/// was taken in parts): impulses over its length, which an impact is a part of; zero before the
-/// first.
+/// Forces at Engine::time(). In stepping they are means over the last step, or over its last
+/// sub-step if it had several: impulses over its length, those of impacts included. They are zero
+/// before the first step.
 struct Forces {
   std::vector<JointForce> joints;    ///< as Scene::joints
   std::vector<SpringForce> springs;  ///< as Scene::springs
@@ -120,7 +120,7 @@ struct Counts {
   long unsolved = 0;                      ///< contact problems above what is accepted
   long error_test_failures = 0;           ///< of IDA; stepping with an accuracy: rejected sub-steps
   long accepted = 0;  ///< contact problems above the tolerance, within what is accepted
-  long halved = 0;    ///< steps, or parts of them, taken in two halves
+  long halved = 0;    ///< steps, or sub-steps, taken in two halves
   /// Event engine: times at which something happens, a start with impacts included; contacts that
   /// hit.
   long events = 0, impacts = 0;

@@ -26,7 +26,7 @@ struct Effect {
 struct Plan {
   EngineKind engine = EngineKind::smooth;  ///< that moves the scene
   std::string why;                         ///< the engine
-  std::string no_event;                    ///< why the event engine is not to be had; empty: it is
+  std::string no_event;                    ///< why the event engine cannot move it; empty: it can
   double then_steps = 0;        ///< s; > 0: of the steps that take over where events cannot go on
   std::vector<Effect> effects;  ///< all that act
 
