@@ -42,21 +42,6 @@ bool has_rows_without_entries(const Constraints& set) {
 
 }  // namespace
 
-double* GuardedRoom::begin(const double* values, std::ptrdiff_t count, std::ptrdiff_t more) {
-  const auto size = static_cast<std::size_t>(count + std::max(more, kLeast));
-  if (room_.size() < size) room_.resize(size);
-  std::copy(values, values + count, room_.begin());
-  std::fill_n(room_.begin() + count, kLookedAt, kUnwritten);
-  return room_.data();
-}
-
-bool GuardedRoom::end(double* values, std::ptrdiff_t count) const {
-  if (static_cast<std::ptrdiff_t>(room_.size()) < count + kLookedAt) return true;  // no memory
-  std::copy_n(room_.begin(), count, values);
-  const auto behind = room_.begin() + count;
-  return std::all_of(behind, behind + kLookedAt, [](double x) { return x == kUnwritten; });
-}
-
 bool all_finite(const double* a, std::size_t n) {
   return first_not_finite(a, static_cast<long>(n)) < 0;
 }
@@ -102,10 +87,15 @@ int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff
                      Fill&& fill) {
   const std::ptrdiff_t count = part.set->count;
   const bool look_at_C = C != nullptr && !part.C_looked_at;
-  double* to = nullptr;
-  if (g != nullptr) to = g_room_.begin(g, count, std::max<std::ptrdiff_t>(count, n));
-  const int flag = fill(to, look_at_C ? C_room_.begin(C, entries, entries + n) : C);
-  if (g != nullptr && !g_room_.end(g, count)) overrun_ = true;
+  double* const to =
+      g != nullptr ? part.g_room.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
+  double* into = C;
+  if (look_at_C) {
+    into = C_room_.begin(entries, entries + n);
+    std::copy(C, C + entries, into);
+  }
+  const int flag = fill(to, into);
+  if (g != nullptr && !part.g_room.end(g, count)) overrun_ = true;
   if (look_at_C && !C_room_.end(C, entries)) overrun_ = true;
   part.C_looked_at |= look_at_C;
   return overrun_ ? -1 : flag;

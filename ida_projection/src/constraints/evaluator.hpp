@@ -54,16 +54,29 @@ bool all_finite(const double* a, std::size_t n);
 class GuardedRoom {
  public:
   void reserve(std::ptrdiff_t count, std::ptrdiff_t more) {
-    room_.resize(static_cast<std::size_t>(count + std::max(more, kLeast)));
+    const auto size = static_cast<std::size_t>(count + std::max(more, kLeast));
+    if (room_.size() < size) room_.resize(size);
   }
-  /// Place for `count` values, which now are `values`; `more`: how many too many do no harm.
-  double* begin(const double* values, std::ptrdiff_t count, std::ptrdiff_t more);
-  /// Copies them back; false: more were written.
-  bool end(double* values, std::ptrdiff_t count) const;
+  /// Place for `count` values, as they were written last; `more`: how many too many do no harm.
+  double* begin(std::ptrdiff_t count, std::ptrdiff_t more) {
+    reserve(count, more);
+    for (std::ptrdiff_t i = 0; i < kLookedAt; ++i) behind(count)[i] = kUnwritten;
+    return room_.data();
+  }
+  /// Copies them; false: more were written.
+  bool end(double* values, std::ptrdiff_t count) {
+    if (room_.empty()) return true;  // there was no memory for it
+    for (std::ptrdiff_t i = 0; i < count; ++i) values[i] = room_[static_cast<std::size_t>(i)];
+    bool unwritten = true;
+    for (std::ptrdiff_t i = 0; i < kLookedAt; ++i)
+      unwritten = unwritten && behind(count)[i] == kUnwritten;
+    return unwritten;
+  }
 
  private:
   static constexpr double kUnwritten = 3.0517578125e-300;  // unlikely in g
   static constexpr std::ptrdiff_t kLeast = 64, kLookedAt = 4;
+  double* behind(std::ptrdiff_t count) { return room_.data() + count; }
   std::vector<double> room_;
 };
 
@@ -74,7 +87,9 @@ class Evaluator {
 
   int rows() const { return rows_; }
   /// So that value() on n unknowns never allocates.
-  void reserve(int n) { g_room_.reserve(rows_, std::max(rows_, n)); }
+  void reserve(int n) {
+    for (Part& part : parts_) part.g_room.reserve(part.set->count, std::max(part.set->count, n));
+  }
   bool uses_differences() const { return uses_differences_; }
   /// Are there rows with a function that gives g and C together?
   bool gives_both() const { return gives_both_; }
@@ -106,6 +121,7 @@ class Evaluator {
     bool gives_both = (dense != nullptr && static_cast<bool>(dense->fill_with_value)) ||
                       (sparse != nullptr && static_cast<bool>(sparse->fill_with_value));
     mutable bool C_looked_at = false;
+    mutable GuardedRoom g_room = {};
     /// How many entries of C it has, on n unknowns.
     std::ptrdiff_t entries(int n) const {
       return sparse != nullptr ? static_cast<std::ptrdiff_t>(sparse->columns.size())
@@ -154,7 +170,7 @@ class Evaluator {
   const Constraints& constraints_;
   Statistics& statistics_;
   std::vector<Part> parts_;
-  GuardedRoom g_room_, C_room_;
+  GuardedRoom C_room_;
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string message_, thrown_;
   int rows_ = 0;

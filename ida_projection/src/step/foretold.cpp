@@ -17,19 +17,14 @@ constexpr double kUnseen = 0.003;   // tolerances: so much may delta miss
 constexpr double kNotStiff = 0.03;  // the same of what is beyond -kappa ycor
 constexpr int kWait = 30;
 
-// Lengths of delta + factor ycor, and of that beyond what `known` is, if it is given.
-struct Lengths {
-  double whole, beyond;
-};
-Lengths lengths(const double* w, const double* ycor, double factor, const double* delta,
-                const double* known, int n) {
-  double whole = 0.0, beyond = 0.0;
+// Length of factor ycor + delta.
+double length(const double* w, double factor, const double* ycor, const double* delta, int n) {
+  double sum = 0.0;
   for (int i = 0; i < n; ++i) {
-    const double sum = factor * ycor[i] + delta[i];
-    whole += (sum * w[i]) * (sum * w[i]);
-    if (known != nullptr) beyond += ((sum - known[i]) * w[i]) * ((sum - known[i]) * w[i]);
+    const double part = (factor * ycor[i] + delta[i]) * w[i];
+    sum += part * part;
   }
-  return {std::sqrt(whole / n), std::sqrt(beyond / n)};
+  return std::sqrt(sum / n);
 }
 
 }  // namespace
@@ -68,19 +63,21 @@ void Foretold::learn(const double* w, const double* ycor, const double* delta, i
   double* beyond = N_VGetArrayPointer(beyond_);
   if (wait_ > 0) --wait_;
   const bool told = known(cj);
-  if (told) followed(lengths(w, ycor, -share_at(cj), delta, beyond, n).beyond <= kUnseen);
-  double square = 0.0, product = 0.0;
+  const double share = told ? -share_at(cj) : 0.0;
+  double square = 0.0, product = 0.0, missed = 0.0;
   for (int i = 0; i < n; ++i) {
-    const double weighted = ycor[i] * w[i];
+    const double weighted = ycor[i] * w[i], miss = (share * ycor[i] + delta[i] - beyond[i]) * w[i];
     square += weighted * weighted;
     product += weighted * w[i] * delta[i];
+    missed += miss * miss;
   }
+  if (told) followed(std::sqrt(missed / n) <= kUnseen);
   share_ = square > 0.0 ? product / square : 0.0;
-  if (!told) patience_ = lengths(w, ycor, -share_, delta, nullptr, n).whole <= kUnseen ? 1 : 0;
+  if (!told) patience_ = length(w, -share_, ycor, delta, n) <= kUnseen ? 1 : 0;
   for (int i = 0; i < n; ++i) beyond[i] = -share_ * ycor[i] + delta[i];
   cj_ = cj;
   used_in_row_ = 0;
-  not_stiff_ = lengths(w, ycor, kappa(cj), delta, nullptr, n).whole <= kNotStiff;
+  not_stiff_ = length(w, kappa(cj), ycor, delta, n) <= kNotStiff;
 }
 
 }  // namespace tether::ida_projection

@@ -123,7 +123,7 @@ Status DistributedStore::value(double t, N_Vector y) {
     note(guarded(
              [&] {
                return constraints_.value(t, ConstVector(y_.data(), n_ + ghosts_),
-                                         Vector(room_.begin(g_.data(), m_, m_), m_));
+                                         Vector(room_.begin(m_, m_), m_));
              },
              thrown),
          "Constraints::value", thrown);

@@ -39,7 +39,8 @@ Status GradientStore::value(double t, N_Vector y) {
   std::string thrown;
   for (const Part& part : parts_) {
     double* const g = g_.data() + part.first;
-    double* const to = room_.begin(g, part.count, part.count);
+    double* const to = room_.begin(part.count, part.count);
+    std::copy_n(g, part.count, to);
     const int flag = guarded([&] { return part.rows->value(t, y, to); }, thrown);
     if (!room_.end(g, part.count))
       return failed(-1, "Gradients::value",
