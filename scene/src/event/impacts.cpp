@@ -13,8 +13,8 @@ namespace tether::scene::event {
 //
 //   t_k + (t_k - t_k-1) r / (1 - r).
 //
-// From an impact on whose bounces nobody can see, it is completed without restitution: what the
-// normal impulses of all later ones amount to is what the closed contact carries until then.
+// Once the remaining bounces are below the tolerance, the impact is completed without restitution.
+// The normal impulses of all later impacts equal those of the closed contact over the same time.
 
 namespace {
 

@@ -68,8 +68,8 @@ class Model {
   virtual void begin_anew(double /*t*/) {}
   /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.
   virtual void settle() {}
-  /// The axis of space next to which the tangents of a contact are chosen, 0 to 2. It hangs on the
-  /// phases before: a state that goes on has to name it.
+  /// The coordinate axis, 0 to 2, from which the tangents of a contact are chosen. It depends on
+  /// earlier phases, so saved states contain it.
   virtual int axis(int /*contact*/) const { return 0; }
   virtual void set_axis(int /*contact*/, int /*axis*/) {}
   virtual void rates(double* q_rate) const = 0;
@@ -84,12 +84,12 @@ class Model {
   virtual void look(int contact, ContactLook& out) = 0;
   virtual double gap(int contact, double& rate) = 0;  ///< and its rate
 
-  /// Whether the bodies are further apart than `by`, as it is seen with little work: spheres about
-  /// them do not meet. What such a contact's gap says is of no matter then.
+  /// Whether the bodies are surely further apart than `by`: spheres around them do not meet. The
+  /// gap of such a contact is not needed.
   virtual bool is_apart(int /*contact*/, double /*by*/) { return false; }
 
-  /// How often a second its bodies, at the speeds that they have, come by the way that both reach
-  /// together. 0: one of them has no end that the other could pass.
+  /// Rate, 1/s, at which the bodies pass each other: relative speed over the sum of their reaches.
+  /// 0: one of them is unbounded.
   virtual double passes(int /*contact*/) { return 0; }
 
   /// How far the contact is inside the border of its features, m; infinite: they have none.

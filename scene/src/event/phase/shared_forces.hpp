@@ -1,10 +1,10 @@
 // Tether: forces of contacts that share them in more than one way (method, section 6.3).
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Feet of one body on a plane, corners of one face on another: accelerations may be unique, forces
-// are not, and with friction several sets of regimes may obey Coulomb's law. An iteration ends at
-// any of them; here the regimes are given, and the answer is the shortest of all forces that the
-// law allows with them. It is unique, so that what is symmetric stays symmetric.
+// For feet of one body on a plane, or corners of one face on another, accelerations may be unique
+// while forces are not, and with friction several sets of regimes may obey Coulomb's law. An
+// iteration ends at any of them. Here the regimes are given, and the shortest lawful forces are
+// computed. They are unique, so symmetric configurations stay symmetric.
 #pragma once
 
 #include <tether/contact/problem.hpp>
@@ -66,8 +66,8 @@ struct SharedForces {
   VectorXd x, w;
 };
 
-/// No normal velocity where contacts are closed, no slip where they stick. Directions that are not
-/// fixed turn to those of w.
+/// The shortest x with no normal velocity where contacts are closed and no slip where they stick.
+/// Directions that are not fixed turn to those of w.
 SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes);
 
 /// Answer of a frictional problem.
@@ -78,13 +78,13 @@ struct FrictionAnswer {
   double error = 0;
 };
 
-/// The same regimes without the error of an iteration, where that is an answer of the law, too:
-/// stuck rows vanish, and what slides is opposed by its limit.
+/// Solves the linear equations of the answer's regimes, which removes the error of the iteration:
+/// stuck rows vanish, and sliding forces have their limit. Kept only if it obeys the law.
 void sharpen(const FrictionProblem& problem, FrictionAnswer& answer);
 
-/// b without what no x can do in these rows, which depend on each other, where that is at most
-/// `band`: the error of a state makes them contradict each other, and an answer that holds all of
-/// them would not exist.
+/// Projects b onto the range of A restricted to these rows, if that changes it by at most `band`.
+/// Dependent rows contradict each other by the error of the state; no solution would obey all of
+/// them.
 VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
                                 double band);
 

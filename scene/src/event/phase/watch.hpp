@@ -7,9 +7,9 @@
 //   support  closed contacts that share their forces in more than one way: single forces mean
 //            nothing there; what counts is whether Coulomb's law has any that leave them at rest
 //
-// A function counts once it is armed: at the start of a phase those that begin at zero are not,
-// until they exceed a band; they count, too, where they fall below minus the band. A gap that is
-// negative within its band at the start counts from there: other contacts pressed it in.
+// Event functions that start at zero are ignored until they have left their band (method, section
+// 4); falling below minus the band is an event, too. A gap that starts negative within its band
+// counts from that value: other contacts pressed it in.
 #pragma once
 
 #include "motion.hpp"
