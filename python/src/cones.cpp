@@ -94,12 +94,15 @@ functions below.)")
           R"(5 rows: friction's and two moments across the normal, |y_t| <= rolling x_n.
 
 With torsional 6: normal, tangents, moment about the normal, two across it.)")
-      .def_property_readonly("kind", [](const tc::Cone& c) { return std::string(name(c.kind)); })
-      .def_readonly("rows", &tc::Cone::rows)
-      .def_readonly("mu", &tc::Cone::mu)
-      .def_readonly("rolling", &tc::Cone::rolling)
-      .def_readonly("torsional", &tc::Cone::torsional)
-      .def_readonly("bound", &tc::Cone::bound)
+      .def_property_readonly(
+          "kind", [](const tc::Cone& c) { return std::string(name(c.kind)); },
+          "the law: free, nonnegative, bounded, planar, friction, torsional, rolling or "
+          "rolling_torsional")
+      .def_readonly("rows", &tc::Cone::rows, "number of rows of x, w and b")
+      .def_readonly("mu", &tc::Cone::mu, "coefficient of friction")
+      .def_readonly("rolling", &tc::Cone::rolling, "length of rolling friction, m")
+      .def_readonly("torsional", &tc::Cone::torsional, "length of torsional friction, m")
+      .def_readonly("bound", &tc::Cone::bound, "largest impulse of a bounded row")
       .def("__repr__", [](const tc::Cone& c) {
         return "<Cone: " + std::string(name(c.kind)) + ", rows " + std::to_string(c.rows) + ">";
       });
@@ -120,8 +123,9 @@ that do not match, values that are not finite or out of range and contacts that 
 
 M: (m, m) positive definite, one of its halves or both; J: (n, m); arrays or scipy.sparse; f: (m,),
 bias: (n,).)")
-      .def_property_readonly("rows", &tc::ConeProblem::rows)
-      .def_property_readonly("cones", &tc::ConeProblem::cones)
+      .def_property_readonly("rows", &tc::ConeProblem::rows, "rows of all cones: n")
+      .def_property_readonly("cones", &tc::ConeProblem::cones,
+                             "list of Cone, in the order of their rows")
       .def_property_readonly(
           "first_rows",
           [](const tc::ConeProblem& p) {
@@ -134,7 +138,8 @@ bias: (n,).)")
       .def_property_readonly(
           "A", [](const tc::ConeProblem& p) { return Eigen::MatrixXd(p.dense_matrix()); },
           "with the compliance")
-      .def_property_readonly("b", [](const tc::ConeProblem& p) { return Eigen::VectorXd(p.b()); })
+      .def_property_readonly(
+          "b", [](const tc::ConeProblem& p) { return Eigen::VectorXd(p.b()); }, "(n,), by row")
       .def(
           "residuals",
           [](const tc::ConeProblem& p, const Array& impulses, const std::string& law) {
@@ -164,28 +169,37 @@ status, with advice.)");
 void bind_solution(py::module_& module) {
   py::class_<tc::ConeSolution>(module, "ConeSolution", "An answer and how good it is.")
       .def_property_readonly(
-          "solved", [](const tc::ConeSolution& s) { return s.status == tc::Status::solved; })
-      .def_property_readonly("status",
-                             [](const tc::ConeSolution& s) { return std::string(name(s.status)); })
-      .def_property_readonly("impulses",
-                             [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.impulses); })
+          "solved", [](const tc::ConeSolution& s) { return s.status == tc::Status::solved; },
+          "whether the error is within the tolerance")
       .def_property_readonly(
-          "velocities", [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.velocities); })
-      .def_property_readonly("residuals",
-                             [](const tc::ConeSolution& s) { return residuals_of(s.residuals); })
-      .def_readonly("error", &tc::ConeSolution::error)
+          "status", [](const tc::ConeSolution& s) { return std::string(name(s.status)); },
+          "solved, unsolved, stalled, cycling, work_limit, round_off or infeasible")
+      .def_property_readonly(
+          "impulses", [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.impulses); },
+          "x, (n,), by row")
+      .def_property_readonly(
+          "velocities", [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.velocities); },
+          "w = A x - b, (n,)")
+      .def_property_readonly(
+          "residuals", [](const tc::ConeSolution& s) { return residuals_of(s.residuals); },
+          "of the impulses, as ConeProblem.residuals gives them")
+      .def_readonly("error", &tc::ConeSolution::error,
+                    "residuals[\"error\"], which is compared with the tolerance")
       .def_readonly("contradicting", &tc::ConeSolution::contradicting,
                     "free rows that nothing satisfies together")
       .def_readonly("blocked", &tc::ConeSolution::blocked,
                     "cones that approach though free rows hold their normal")
-      .def_property_readonly("infeasible_direction",
-                             [](const tc::ConeSolution& s) {
-                               return array(
-                                   s.infeasible_direction.data(),
-                                   static_cast<py::ssize_t>(s.infeasible_direction.size()));
-                             })
-      .def_readonly("advice", &tc::ConeSolution::advice)
-      .def_property_readonly("work", [](const tc::ConeSolution& s) { return s.counts.work; })
+      .def_property_readonly(
+          "infeasible_direction",
+          [](const tc::ConeSolution& s) {
+            return array(s.infeasible_direction.data(),
+                         static_cast<py::ssize_t>(s.infeasible_direction.size()));
+          },
+          "(n,) d that proves infeasibility: A d = 0 and b.d > 0; else empty")
+      .def_readonly("advice", &tc::ConeSolution::advice, "what to try when it is not solved")
+      .def_property_readonly(
+          "work", [](const tc::ConeSolution& s) { return s.counts.work; },
+          "estimated nanoseconds, counted from operations")
       .def("__repr__", [](const tc::ConeSolution& s) {
         return "<ConeSolution: " + std::string(name(s.status)) + ", error " + shown(s.error) + ">";
       });

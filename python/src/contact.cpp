@@ -111,17 +111,21 @@ A: (d n, d n) array or scipy.sparse matrix in 1/kg, b: (d n,) in m/s, mu: (n,), 
 (normal, tangent, tangent) or d = 2 in the plane. Relative velocities after the impulses x are
 w = A x - b. Raises ValueError on sizes that do not match and values that are not finite.)")
       .def(py::init(&make_problem), "A"_a, "b"_a, "mu"_a)
-      .def_property_readonly("contacts", &tc::Problem::contacts)
-      .def_property_readonly("dimension", &tc::Problem::dimension)
-      .def_property_readonly("A",
-                             [](const tc::Problem& p) { return Eigen::MatrixXd(p.dense_matrix()); })
-      .def_property_readonly("b", [](const tc::Problem& p) { return Eigen::VectorXd(p.b()); })
-      .def_property_readonly("mu",
-                             [](const tc::Problem& p) {
-                               Eigen::VectorXd mu(p.contacts());
-                               for (int i = 0; i < p.contacts(); ++i) mu[i] = p.mu(i);
-                               return mu;
-                             })
+      .def_property_readonly("contacts", &tc::Problem::contacts, "number of contacts n")
+      .def_property_readonly("dimension", &tc::Problem::dimension, "3, or 2 in the plane: d")
+      .def_property_readonly(
+          "A", [](const tc::Problem& p) { return Eigen::MatrixXd(p.dense_matrix()); },
+          "(d n, d n), 1/kg")
+      .def_property_readonly(
+          "b", [](const tc::Problem& p) { return Eigen::VectorXd(p.b()); }, "(d n,), m/s")
+      .def_property_readonly(
+          "mu",
+          [](const tc::Problem& p) {
+            Eigen::VectorXd mu(p.contacts());
+            for (int i = 0; i < p.contacts(); ++i) mu[i] = p.mu(i);
+            return mu;
+          },
+          "(n,), coefficients of friction")
       .def(
           "residuals",
           [](const tc::Problem& p, const Array& impulses, const std::string& law) {
@@ -144,30 +148,42 @@ error in velocity. start: impulses to begin with. max_work: about nanoseconds. s
 replace the law at single contacts. What cannot be solved is a status, with advice.)");
 
   py::class_<tc::Solution>(module, "Solution", "An answer and how good it is.")
-      .def_property_readonly("solved",
-                             [](const tc::Solution& s) { return s.status == tc::Status::solved; })
-      .def_property_readonly("status",
-                             [](const tc::Solution& s) { return std::string(name(s.status)); })
-      .def_property_readonly("impulses",
-                             [](const tc::Solution& s) { return Eigen::VectorXd(s.impulses); })
-      .def_property_readonly("velocities",
-                             [](const tc::Solution& s) { return Eigen::VectorXd(s.velocities); })
+      .def_property_readonly(
+          "solved", [](const tc::Solution& s) { return s.status == tc::Status::solved; },
+          "whether the error is within the tolerance")
+      .def_property_readonly(
+          "status", [](const tc::Solution& s) { return std::string(name(s.status)); },
+          "solved, unsolved, stalled, cycling, work_limit, round_off or infeasible")
+      .def_property_readonly(
+          "impulses", [](const tc::Solution& s) { return Eigen::VectorXd(s.impulses); },
+          "x, (d n,): normal, tangents of each contact, N s")
+      .def_property_readonly(
+          "velocities", [](const tc::Solution& s) { return Eigen::VectorXd(s.velocities); },
+          "w = A x - b, (d n,), m/s")
       .def_property_readonly(
           "regimes", [](const tc::Solution& s) { return words_of(s.regimes); },
           "separating, sticking or sliding")
-      .def_readonly("error", &tc::Solution::error)
-      .def_readonly("advice", &tc::Solution::advice)
-      .def_readonly("replaced", &tc::Solution::replaced)
-      .def_property_readonly("infeasible_direction",
-                             [](const tc::Solution& s) {
-                               return array(
-                                   s.infeasible_direction.data(),
-                                   static_cast<py::ssize_t>(s.infeasible_direction.size()));
-                             })
-      .def_property_readonly("work", [](const tc::Solution& s) { return s.counts.work; })
-      .def_property_readonly("sweeps", [](const tc::Solution& s) { return s.counts.sweeps; })
-      .def_property_readonly("factorisations",
-                             [](const tc::Solution& s) { return s.counts.factorisations; })
+      .def_readonly("error", &tc::Solution::error,
+                    "residuals[\"fixed_point\"], which is compared with the tolerance")
+      .def_readonly("advice", &tc::Solution::advice, "what to try when it is not solved")
+      .def_readonly("replaced", &tc::Solution::replaced,
+                    "contacts with Coulomb's law instead of maximum_dissipation")
+      .def_property_readonly(
+          "infeasible_direction",
+          [](const tc::Solution& s) {
+            return array(s.infeasible_direction.data(),
+                         static_cast<py::ssize_t>(s.infeasible_direction.size()));
+          },
+          "(d n,) d that proves infeasibility: A d = 0 and b.d > 0; else empty")
+      .def_property_readonly(
+          "work", [](const tc::Solution& s) { return s.counts.work; },
+          "estimated nanoseconds, counted from operations")
+      .def_property_readonly(
+          "sweeps", [](const tc::Solution& s) { return s.counts.sweeps; },
+          "sweeps over all contacts")
+      .def_property_readonly(
+          "factorisations", [](const tc::Solution& s) { return s.counts.factorisations; },
+          "factorisations of sparse matrices")
       .def("__repr__", [](const tc::Solution& s) {
         return "<Solution: " + std::string(name(s.status)) + ", error " + shown(s.error) + ">";
       });

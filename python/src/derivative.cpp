@@ -100,8 +100,9 @@ rows[k], columns[k].)");
       .def_property_readonly(
           "strictly_regular", [](const tc::Derivative& d) { return d.report().strictly_regular; },
           "every contact is strictly open, sticking or sliding")
-      .def_property_readonly("regimes",
-                             [](const tc::Derivative& d) { return words_of(d.report().regimes); })
+      .def_property_readonly(
+          "regimes", [](const tc::Derivative& d) { return words_of(d.report().regimes); },
+          "separating, sticking or sliding: the branch of each contact")
       .def_property_readonly(
           "kinks",
           [](const tc::Derivative& d) {
@@ -111,16 +112,24 @@ rows[k], columns[k].)");
             return out;
           },
           "(contact, branch whose derivative is given, other regime, relative margin)")
-      .def_property_readonly("rank", [](const tc::Derivative& d) { return d.report().rank; })
-      .def_property_readonly("unknowns",
-                             [](const tc::Derivative& d) { return d.report().unknowns; })
+      .def_property_readonly(
+          "rank", [](const tc::Derivative& d) { return d.report().rank; },
+          "how many of `unknowns` are determined")
+      .def_property_readonly(
+          "unknowns", [](const tc::Derivative& d) { return d.report().unknowns; },
+          "components of touching contacts")
       .def_property_readonly(
           "not_unique", [](const tc::Derivative& d) { return d.report().not_unique; },
           "contacts whose impulses are not determined")
-      .def_property_readonly("velocities_unique",
-                             [](const tc::Derivative& d) { return d.report().velocities_unique; })
-      .def_property_readonly("error", [](const tc::Derivative& d) { return d.report().error; })
-      .def_property_readonly("advice", [](const tc::Derivative& d) { return d.report().advice; });
+      .def_property_readonly(
+          "velocities_unique", [](const tc::Derivative& d) { return d.report().velocities_unique; },
+          "velocities are determined even where impulses are not")
+      .def_property_readonly(
+          "error", [](const tc::Derivative& d) { return d.report().error; },
+          "relative error of the impulses as a solution")
+      .def_property_readonly(
+          "advice", [](const tc::Derivative& d) { return d.report().advice; },
+          "what the report means for the use of the derivative");
 }
 
 }  // namespace tether::python

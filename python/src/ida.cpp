@@ -278,10 +278,13 @@ void bind_ida(py::module_& module) {
 
   py::class_<Result>(module, "Result", "t: (T,), y and yp: (T, N), up to where IDA came.")
       .def_property_readonly(
-          "t", [](const Result& r) { return array(r.t, {static_cast<py::ssize_t>(r.t.size())}); })
-      .def_property_readonly("y", [](const Result& r) { return r.rows(r.y); })
-      .def_property_readonly("yp", [](const Result& r) { return r.rows(r.yp); })
-      .def_readonly("steps", &Result::steps)
+          "t", [](const Result& r) { return array(r.t, {static_cast<py::ssize_t>(r.t.size())}); },
+          "times reached, (T,)")
+      .def_property_readonly(
+          "y", [](const Result& r) { return r.rows(r.y); }, "unknowns, (T, N)")
+      .def_property_readonly(
+          "yp", [](const Result& r) { return r.rows(r.yp); }, "(T, N): y'")
+      .def_readonly("steps", &Result::steps, "steps of IDA")
       .def_readonly("residuals", &Result::residuals, "evaluations of F by IDA")
       .def_readonly("status", &Result::status, "of the projection, \"plain\" without")
       .def_readonly("message", &Result::message, "what went wrong; empty when all is well")
@@ -294,8 +297,8 @@ void bind_ida(py::module_& module) {
              R"(Integrates residual(t, y, yp) = 0 over times[0] .. times[-1]: a Result.
 
 y0, yp0: consistent initial values (N,); make_consistent: move them there first.
-constraints(t, y): m values that the solution keeps at zero; each step is moved onto them by the
-shortest move in the weights rtol |y| + atol before it is accepted, and so is what is returned.
+constraints(t, y): m values that the solution keeps at zero; each step is moved onto them by a
+shortest move before it is accepted, and so is what is returned.
 constraint_jacobian(t, y): their (m, N) matrix dg/dy; without it, differences.
 jacobian(t, y, yp, cj): the (N, N) matrix dF/dy + cj dF/dyp; without it, differences.
 algebraic: (N,) true where y' does not enter F; found by itself where it is not given.

@@ -110,43 +110,63 @@ void bind_scene(py::module_& module) {
 
 t: (T,); position, velocity, angular_velocity: (T, bodies, 3); orientation: (T, bodies, 4) as
 w, x, y, z; energy, drift, penetration, residual, contacts: (T,).)")
-      .def_readonly("bodies", &Film::bodies)
-      .def_property_readonly("t", [](const Film& f) { return f.of_records(f.t); })
-      .def_property_readonly("position", [](const Film& f) { return f.of_bodies(f.position, 3); })
-      .def_property_readonly("orientation",
-                             [](const Film& f) { return f.of_bodies(f.orientation, 4); })
-      .def_property_readonly("velocity", [](const Film& f) { return f.of_bodies(f.velocity, 3); })
-      .def_property_readonly("angular_velocity",
-                             [](const Film& f) { return f.of_bodies(f.angular_velocity, 3); })
-      .def_property_readonly("energy", [](const Film& f) { return f.of_records(f.energy); })
-      .def_property_readonly("drift", [](const Film& f) { return f.of_records(f.drift); })
-      .def_property_readonly("penetration",
-                             [](const Film& f) { return f.of_records(f.penetration); })
-      .def_property_readonly("residual", [](const Film& f) { return f.of_records(f.residual); })
-      .def_property_readonly("contacts", [](const Film& f) { return f.of_records(f.contacts); })
+      .def_readonly("bodies", &Film::bodies, "their names, in the order of the arrays")
+      .def_property_readonly(
+          "t", [](const Film& f) { return f.of_records(f.t); }, "times of the records, (T,), s")
+      .def_property_readonly(
+          "position", [](const Film& f) { return f.of_bodies(f.position, 3); },
+          "of centres of mass, (T, bodies, 3), m")
+      .def_property_readonly(
+          "orientation", [](const Film& f) { return f.of_bodies(f.orientation, 4); },
+          "body to world, (T, bodies, 4): w, x, y, z")
+      .def_property_readonly(
+          "velocity", [](const Film& f) { return f.of_bodies(f.velocity, 3); },
+          "of centres of mass, (T, bodies, 3), m/s")
+      .def_property_readonly(
+          "angular_velocity", [](const Film& f) { return f.of_bodies(f.angular_velocity, 3); },
+          "(T, bodies, 3), rad/s")
+      .def_property_readonly(
+          "energy", [](const Film& f) { return f.of_records(f.energy); },
+          "kinetic and potential, (T,), J")
+      .def_property_readonly(
+          "drift", [](const Film& f) { return f.of_records(f.drift); },
+          "largest violation of a joint, (T,), m or rad")
+      .def_property_readonly(
+          "penetration", [](const Film& f) { return f.of_records(f.penetration); },
+          "the deepest, (T,), m")
+      .def_property_readonly(
+          "residual", [](const Film& f) { return f.of_records(f.residual); },
+          "of the last contact problem, (T,)")
+      .def_property_readonly(
+          "contacts", [](const Film& f) { return f.of_records(f.contacts); }, "their number, (T,)")
       .def_property_readonly("events", &events, "Of the event engine, in order of time.")
-      .def_property_readonly("engine", [](const Film& f) { return f.result.engine; })
+      .def_property_readonly(
+          "engine", [](const Film& f) { return f.result.engine; }, "smooth, stepping or event")
       .def_property_readonly(
           "failure", [](const Film& f) { return f.result.failure; },
           "Why the run could not go on; empty: it reached its end.")
       .def_property_readonly(
           "met", [](const Film& f) { return f.result.met(); },
           "Every expectation of the scene that counts was judged and holds.")
-      .def_property_readonly("remarks", [](const Film& f) { return f.result.remarks; })
+      .def_property_readonly(
+          "remarks", [](const Film& f) { return f.result.remarks; },
+          "data that written files do not contain")
       .def_property_readonly(
           "warnings", [](const Film& f) { return f.result.warnings; },
           "Why the motion is not to be trusted; empty: nothing was seen.")
-      .def_property_readonly("counts", &counts);
+      .def_property_readonly("counts", &counts, "work of the engine: a dict");
 
   py::class_<ts::Scene>(module, "Scene", "A scene: every default filled in.")
-      .def_readonly("name", &ts::Scene::name)
-      .def_readwrite("end", &ts::Scene::end, "s")
-      .def_property_readonly("bodies",
-                             [](const ts::Scene& s) {
-                               std::vector<std::string> names;
-                               for (const ts::Body& body : s.bodies) names.push_back(body.name);
-                               return names;
-                             })
+      .def_readonly("name", &ts::Scene::name, "title of the scene")
+      .def_readwrite("end", &ts::Scene::end, "time at which a run ends, s")
+      .def_property_readonly(
+          "bodies",
+          [](const ts::Scene& s) {
+            std::vector<std::string> names;
+            for (const ts::Body& body : s.bodies) names.push_back(body.name);
+            return names;
+          },
+          "their names")
       .def_property_readonly(
           "text", [](const ts::Scene& s) { return ts::write_scene(s); }, "The scene as TOML.")
       .def_property_readonly(
