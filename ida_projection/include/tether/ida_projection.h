@@ -38,23 +38,23 @@ enum {
 
 /** Outcome of the last action of the plugin. Negative values end the run. */
 typedef enum {
-  TETHER_UNUSED = 0,
-  TETHER_SUCCESS,
-  TETHER_NOT_CONVERGED,
-  TETHER_MOVE_TOO_LONG,
-  TETHER_INCONSISTENT,
-  TETHER_NOT_FINITE,
-  TETHER_CALLBACK_RECOVERABLE,
-  TETHER_CORRECTOR_FAILED,
-  TETHER_COLLAPSED,
-  TETHER_DOUBTFUL,
-  TETHER_CALLBACK_FATAL = -1,
-  TETHER_LATE_ATTACH = -2,
-  TETHER_SIMULTANEOUS_SENSITIVITIES = -3,
-  TETHER_NEVER_CALLED = -4,
-  TETHER_INTERNAL_ERROR = -5,
-  TETHER_OUT_OF_MEMORY = -6,
-  TETHER_MISUSED = -7
+  TETHER_UNUSED = 0,           /**< attached, IDA has not called yet */
+  TETHER_SUCCESS,              /**< the point lies on the constraints */
+  TETHER_NOT_CONVERGED,        /**< moves did not shrink, or too many of them */
+  TETHER_MOVE_TOO_LONG,        /**< longer than largest_move allows */
+  TETHER_INCONSISTENT,         /**< rows contradict each other */
+  TETHER_NOT_FINITE,           /**< NaN or infinity in g, C or y */
+  TETHER_CALLBACK_RECOVERABLE, /**< a callback returned > 0 */
+  TETHER_CORRECTOR_FAILED,     /**< the decorated solver failed */
+  TETHER_COLLAPSED,            /**< IDA rejects most steps; the message tells why */
+  TETHER_DOUBTFUL,             /**< F does not keep a row, C is wrong, or atol is too large */
+  TETHER_CALLBACK_FATAL = -1,  /**< a callback returned < 0 */
+  TETHER_LATE_ATTACH = -2,     /**< attached after IDA was initialised: call IDAReInit */
+  TETHER_SIMULTANEOUS_SENSITIVITIES = -3, /**< use IDA_STAGGERED */
+  TETHER_NEVER_CALLED = -4,               /**< another nonlinear solver was attached later */
+  TETHER_INTERNAL_ERROR = -5,             /**< the message tells why */
+  TETHER_OUT_OF_MEMORY = -6,              /**< inside IDA's call; IDAReInit starts anew */
+  TETHER_MISUSED = -7 /**< a call that cannot be answered; the message tells why */
 } tether_status;
 
 /** Text of the last error in this thread; "" if there was none. Valid until the next call. */
