@@ -8,40 +8,40 @@
 
 namespace tether::contact::detail {
 
-/// A contact that strikes: approach before and with the forces of the step, > 0, m/s; what of it is
-/// given back (0: too slow to bounce).
+/// An impact: speed of approach before and with the forces of the step, > 0, m/s, and coefficient
+/// of restitution (0: too slow to bounce).
 struct Impact {
   int contact;
   double came, comes, restitution;
 };
 
-/// method, section 7. An approach that ends within the step ends at once and as a whole, bias 0:
-/// with gap / dt, part of it would be left to the next step, and where slip stops or turns round in
-/// the impact the two parts do not add up to the whole, however short the step. Slower approaches
-/// than the threshold keep gap / dt, so that what comes to rest does so at the surface.
+/// Chooses the whole impacts of a step (method, section 7.1). An approach that ends within the step
+/// gets bias 0. With gap / dt a part of the impact would be left to the next step; if slip stops or
+/// reverses, the two parts do not add up to the whole, however short the step. Approaches slower
+/// than the threshold keep gap / dt, so that bodies come to rest at the surface.
 class Impacts {
  public:
-  /// In m/s for a size of 1 m; they go with the root of the size (method, section 7). What may
-  /// bounce is an impact above the smaller of both.
+  /// Thresholds in m/s for a size of 1 m; they grow with the root of the size. With restitution an
+  /// approach is an impact above the smaller of both.
   Impacts(double threshold, double restitution_threshold)
       : threshold_(threshold), restitution_threshold_(restitution_threshold) {}
 
-  /// Start of a step: velocities that bodies come with, before forces.
+  /// Keeps the velocities at the start of a step, before forces.
   void remember(const BodySet& bodies) { remember(bodies.motion); }
   void remember(const std::vector<RigidBody>& coming) { coming_ = coming; }
   const std::vector<RigidBody>& coming() const { return coming_; }
   /// After the contacts are found.
   void choose(const NearContacts& near, const BodySet& bodies, double dt, StepContacts& contacts);
   const std::vector<Impact>& list() const { return list_; }
-  /// Leaves nothing but these.
+  /// Removes all other contacts.
   void keep_only_impacts(StepContacts& contacts);
-  /// Velocities with the forces of the step, before impulses; where there are impacts.
+  /// Velocities with the forces of the step, before impulses; only if there are impacts.
   const std::vector<RigidBody>& free() const { return free_; }
   /// An impact that the first ones have caused.
   void add(const Impact& later) { list_.push_back(later); }
-  /// Approach, m/s, from which on it is an impact.
+  /// Least speed of approach, m/s, of an impact.
   double least_speed(const NearContacts& near, const PointContact& c) const;
-  /// The part of an approach that comes back; 0: too slow to bounce.
+  /// Coefficient of restitution for this speed; 0: too slow to bounce.
   double given_back(const NearContacts& near, const PointContact& c, double speed) const;
   bool is_impact(const NearContacts& near, const PointContact& c, double speed) const {
     return speed > least_speed(near, c) || given_back(near, c, speed) > 0;

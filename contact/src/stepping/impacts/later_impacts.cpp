@@ -26,8 +26,8 @@ LaterImpacts::LaterImpacts(double threshold, double restitution_threshold,
       restitution_(std::move(restitution)),
       solver_(cold(options), maker, LawUse::none) {}
 
-// Marks the islands where the one solve has stopped a contact at gap / dt that closes only because
-// of an impact, by more than the least speed of an impact. False: there are none.
+// Marks the islands in which a contact closes only because of an impact, at more than the least
+// speed of an impact, so that the solve stopped it at gap / dt. False: there are none.
 bool LaterImpacts::find_islands(const NearContacts& near, const Impacts& impacts,
                                 const BodySet& bodies, double dt, const StepContacts& contacts) {
   const auto later = [&](std::size_t k) {
@@ -163,8 +163,8 @@ bool LaterImpacts::run_passes(const NearContacts& near, const Impacts& impacts, 
   return true;
 }
 
-// Passes see bodies where the step began, and lift them for all of it: an island that gains energy
-// by them keeps the one solve, which does not.
+// Passes use the positions at the start and move bodies for the whole step, which may add energy.
+// Such an island keeps the one solve, which adds none.
 void LaterImpacts::keep_energy(const Impacts& impacts, BodySet& bodies, StepContacts& contacts) {
   add_of_forces(impacts, force_);
   gain_.assign(bodies.motion.size(), 0);

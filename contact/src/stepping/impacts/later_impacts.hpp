@@ -13,14 +13,13 @@
 
 namespace tether::contact::detail {
 
-/// method, section 7. A contact that begins to close because of an impact, and is closed before
-/// the end of the step, strikes within it: a ball that the first of a row sends on, the other end
-/// of a rod. One solve with bias gap / dt would leave a part of that impact to the next step. So
-/// the island is solved again from the velocities before the impulses, in passes, each with the
-/// contacts that touch or that close by its velocities. Where an impact does not bounce the way to
-/// it counts for the others; where it bounces the velocities after it move bodies for the whole
-/// step. What still closes after kPasses has bias gap / dt in the last one. Islands of more than
-/// kMostContacts keep the one solve: their impacts do not end one by one.
+/// Impacts within a step that an impact of the same step causes (method, section 7.1): the next
+/// ball of a row, the other end of a rod. One solve with bias gap / dt would leave a part of them
+/// to the next step. The island is therefore solved again from the velocities before the impulses,
+/// in passes; each pass has the contacts that touch or close with its velocities. If an impact does
+/// not bounce, the displacement up to it counts for the others; if it bounces, the velocities after
+/// it move the bodies for the whole step. Contacts that still close after kPasses get bias gap /
+/// dt. Islands of more than kMostContacts keep the one solve.
 class LaterImpacts {
  public:
   static constexpr int kPasses = 16, kMostContacts = 16;
@@ -34,8 +33,8 @@ class LaterImpacts {
   /// Not in islands of mechanisms with laws, whose impulses are those of one problem.
   void set_laws(const JointPart& joints) { laws_ = &joints; }
 
-  /// After the solve and what bounces in it. Changes velocities and impulses, and adds to
-  /// `impacts`, where there are later ones whose problems are all solved.
+  /// Called after the solve and restitution. If there are later impacts and their problems are all
+  /// solved, changes velocities and impulses, and adds to `impacts`.
   Counts take(const NearContacts& near, Impacts& impacts, double dt, BodySet& bodies,
               StepContacts& contacts);
 

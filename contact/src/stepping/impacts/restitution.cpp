@@ -40,7 +40,7 @@ void Restitution::choose(const Impacts& chosen, const Impacts& forces,
   for (const Impact& i : chosen.list()) {
     if (i.restitution == 0) continue;
     PointContact& c = contacts.points[at(i.contact)];
-    // The speed that the forces of this step added is not given back: a body at rest would hop.
+    // Restitution of the speed that the forces of this step add would make a body at rest hop.
     const double speed = i.restitution * std::min(i.came, i.comes);
     bounces_.push_back({i.contact, speed, speed / i.comes});
     if (law_ != RestitutionLaw::newton) continue;

@@ -13,13 +13,12 @@ namespace tether::contact::detail {
 /// The same without the impulses of the problem before.
 BodyOptions cold(BodyOptions options);
 
-/// method, eq. 27. `newton`: contacts that bounce leave with epsilon times the speed they came
-/// with, in the one solve that friction takes part in. `poisson`: the contact problem without
-/// restitution, impulses x; then epsilon x at the contacts that bounce; then the contact problem
-/// once more, for contacts which that pressed together. In both, what restitution adds to the
-/// solution without it is scaled down where an island of bodies would end the step with more energy
-/// than it began it with and its forces, motors among them, add on the way that the new velocities
-/// go. Limits of joints bounce as contacts do.
+/// Restitution (method, eq. 27). `newton`: bouncing contacts leave with epsilon times their speed
+/// of approach, in one solve with friction. `poisson`: the contact problem without restitution
+/// gives impulses x; epsilon x is added at bouncing contacts; then the contact problem is solved
+/// once more. In both, the change by restitution is scaled down in islands that would gain more
+/// energy than their forces, motors included, supply along the new velocities. Limits of joints
+/// bounce as contacts do.
 class Restitution {
  public:
   Restitution(RestitutionLaw law, const BodyOptions& options, IslandMaker* maker, LawUse laws);
@@ -27,9 +26,8 @@ class Restitution {
   /// Problems include the laws of joints.
   void set_laws(JointPart& joints) { laws_ = &joints; }
 
-  /// After the impacts are chosen: those that bounce. `chosen` has the velocities that bodies came
-  /// with; `forces` those before and after the forces of the step; `limits` are the limits of
-  /// joints that are struck.
+  /// Selects the impacts that bounce. `chosen` has the velocities at the start; `forces` those
+  /// before and after the forces of the step; `limits` are the limits of joints that are struck.
   void choose(const Impacts& chosen, const Impacts& forces, const std::vector<Strike>& limits,
               const BodySet& bodies, StepContacts& contacts);
   /// After the solve. Changes velocities and impulses; returns the number of bounces.

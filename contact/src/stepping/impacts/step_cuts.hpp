@@ -14,13 +14,12 @@
 
 namespace tether::contact::detail {
 
-/// method, section 7. When an approach over this gap ends: gap = came t + more t^2; where it
-/// leaves, came < 0, needs more > 0.
+/// Time at which an approach closes this gap: gap = came t + more t^2. A contact that separates,
+/// came < 0, needs more > 0.
 double closing_time(double gap, double came, double more);
 
-/// A contact that may close in a sub-step, m/s: with forces its approach grows from `came` to
-/// `comes`. `falls`: how much of that the weight of falling bodies adds, whose positions have half
-/// of it.
+/// A contact that may close in a sub-step: forces raise its speed of approach from `came` to
+/// `comes`, m/s. `falls`: the share of freely falling bodies, whose positions change by half of it.
 struct Approach {
   int contact;
   double came, comes, falls;
@@ -30,21 +29,21 @@ struct Approach {
   double speed(double gap, double dt) const { return came + (comes - came) * time(gap, dt) / dt; }
 };
 
-/// Impulses of a step are those of all its parts and impacts: adds those of `part` by identity.
+/// Adds the impulses of `part` by identity: those of a step are sums over its sub-steps and
+/// impacts.
 void add_impulses(const StepContacts& part, StepContacts& sum);
 
-/// A step of the islands that strike is taken in parts: up to where the first contact closes, the
-/// impact itself, which takes no time, and the rest. Where impacts are taken at the start of a step
-/// instead, positions are off by the way that the velocities before and after it differ by, from
-/// the start to the closing: an error of the step's length times the phase of the impact in it,
-/// which no two step lengths have in common.
+/// Cuts the step of striking islands (method, section 7.1): up to the first closing gap, the impact
+/// itself, which takes no time, and the rest. Without a cut an impact is taken at the start of its
+/// step. The positions then have an error of the step's length times the phase of the impact in the
+/// step, and this phase differs from one step length to the next.
 class StepCuts {
  public:
-  /// As LaterImpacts: of the scene, or, up to the second, of the islands that strike.
+  /// Most contacts of a scene, or, in scenes of up to the second number, of a striking island.
   static constexpr std::size_t kMostContacts = 16, kMostInScene = 512;
   static constexpr int kMost = 32;  // in a step; then as without
-  /// Cuts of more than kMostContacts, in problems of a step: what a step may spend on them, kept up
-  /// to the second, what there is at the start, and what a cut takes.
+  /// Budget of cuts with more than kMostContacts, in contact problems: income of a step, most that
+  /// is kept, first stock, price of a cut.
   static constexpr double kShare = 0.05, kMostKept = 16, kFirst = 3, kPrice = 3;
 
   StepCuts(const BodyOptions& options, IslandMaker* maker);
@@ -52,12 +51,12 @@ class StepCuts {
   /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the
   /// sub-step after them: they need no laws.)
   void set_laws(const JointPart& joints) { laws_ = &joints; }
-  /// Adds what a step may spend; called in each step.
+  /// Adds the income of a step.
   void earn() { kept_ = std::min(kept_ + kShare, kMostKept); }
   double kept() const { return kept_; }
   void set_kept(double kept) { kept_ = kept; }
 
-  /// Which contacts have pressed in the sub-step before: of its solve.
+  /// Keeps which contacts pressed in the solve of the sub-step before.
   void remember(const WarmStart& solved);
   /// Whether a step of so many contacts may be cut.
   bool may_cut(std::size_t contacts) const {
@@ -75,7 +74,8 @@ class StepCuts {
   /// From the start of the sub-step to the impact, s; all of it: none before its end.
   double when() const { return when_; }
   bool strikes(const PointContact& c) const;
-  /// There: how much later, s, the first of what strikes touches by the speed that it has then.
+  /// At the end of the approach: time, s, until the first striking contact touches at its speed
+  /// then.
   double left(NearContacts& near, const BodySet& bodies, double dt);
 
   /// At the impact: leaves contacts that touch, with those that strike among `impacts`. Those that
