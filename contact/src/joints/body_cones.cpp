@@ -15,11 +15,12 @@ namespace tether::contact::detail {
 
 namespace {
 
-// A_nn over that without joints; both are squares of lengths, the one left by rounding 1e-14.
+// A direction is held by the joints if A is less than this part of A without joints there. Both are
+// squares of lengths; rounding leaves a length of about 1e-14.
 constexpr double kHeld = 1e-14;
 constexpr std::size_t kFew = 20;  // cones whose dense factors cost little beside their solve
-constexpr double kSoft = 1e-5;    // compliance of a support over what moves there without joints
-constexpr double kSlip = 1e-12;   // of the speeds that a slip is the difference of
+constexpr double kSoft = 1e-5;    // compliance of a support over the mobility without joints
+constexpr double kSlip = 1e-12;   // of the speeds whose difference is a slip: rounding
 
 using linalg::at;
 
@@ -86,7 +87,7 @@ void BodyCones::find_islands(const Mechanisms& mechanisms, const std::vector<Bod
   start_.push_back(n);
 }
 
-// By node, then by cone.
+// Lists the moving bodies of the island's cones, by node, then by cone.
 void BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
   sides_.clear();
   alone_.clear();
@@ -105,8 +106,8 @@ void BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<Bo
   jointed_ = !sides_.empty() && sides_.front().node < mechanisms.count();
 }
 
-// The cones that touch one mechanism, sides begin .. end: column by column what the mechanism
-// answers.
+// Adds the blocks of A of one mechanism, sides begin .. end: the response of the mechanism to unit
+// impulses of each cone on it.
 void BodyCones::add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end) {
   Mechanism& mechanism = mechanisms[sides_[begin].node];
   for (std::size_t p = begin; p < end;) {
@@ -143,9 +144,8 @@ void BodyCones::assemble(Mechanisms& mechanisms, const std::vector<BodyCone>& co
   }
 }
 
-// Contacts whose normal velocity no impulse changes, and directions of slip and of moments that the
-// joints hold: what rounding leaves of them in A would be divided by what it leaves of them on the
-// diagonal.
+// Leaves out contacts whose normal velocity no impulse changes, and removes from A the directions
+// of slip and of moments that the joints hold: there a solve would divide rounding by rounding.
 void BodyCones::leave_out_held(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v) {
   kept_.assign(members_.size(), 1);
   held_.clear();
@@ -186,7 +186,7 @@ void BodyCones::leave_out_held(const std::vector<BodyCone>& cones, const std::ve
   }
 }
 
-// b of a cone; where joints hold a direction, what rounding leaves there is no slip.
+// b of a cone; in directions that the joints hold, a slip of the size of rounding counts as 0.
 Eigen::VectorXd BodyCones::approach(int place, const BodyCone& c,
                                     const std::vector<Vector6d>& v) const {
   BodyCone::Column w = speeds(c, v);

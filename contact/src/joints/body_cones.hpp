@@ -55,15 +55,16 @@ class BodyCones {
     int sweeps = 0;            ///< the most of any island
     std::vector<int> blocked;  ///< ascending
   };
-  /// Changes velocities that the joints already allow, v, by impulses that keep them so, and adds
-  /// what the joints do to the pulls. x, cone by cone: where to start from, and the impulses found.
+  /// v must meet the joints; it is changed by the impulses found and by those of the joints, so
+  /// that it still does. The latter are added to the pulls. x, cone by cone: start in, impulses
+  /// out.
   const Result& solve(Mechanisms& mechanisms, const std::vector<BodyCone>& cones,
                       std::vector<Vector6d>& v, linalg::VectorX& x);
 
  private:
   using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
-  /// One body of a cone that moves, and the cone's rows on its u. node: its mechanism, or, after
-  /// all of them, the body itself. place: in members_.
+  /// A moving body of a cone and the cone's rows on its u. node: number of its mechanism, or the
+  /// number of mechanisms plus that of a body without one. place: index of the cone in members_.
   struct Side {
     int place, body, node;
     BodyCone::Rows H;
@@ -97,8 +98,8 @@ class BodyCones {
   linalg::DisjointSets sets_;                  // of mechanisms and single bodies
   std::vector<int> row_;                       // of each cone: its first row in x
   std::vector<int> first_of_, order_, start_;  // cones island by island
-  // The present island: its cones, those of them that are solved, the sides of all, whether a
-  // mechanism is among these, A, and by cone and row its diagonal without joints.
+  // The present island: its cones, which of them are solved, their sides, whether it has a
+  // mechanism, A, and the diagonal of A without joints by cone and row.
   std::vector<int> members_;
   std::vector<char> kept_;
   std::vector<Side> sides_;

@@ -13,7 +13,7 @@ using linalg::at;
 
 namespace {
 
-// Warm starts keep the moment of a contact under this: contacts have no bits so high (contact_id).
+// Identity of a contact's moment in warm starts; contact_id leaves this bit free.
 constexpr std::uint64_t moment_id(std::uint64_t contact) {
   return contact | std::uint64_t{1} << 62;
 }
@@ -173,8 +173,8 @@ void ConeIslands::solve(BodySolver& others, const std::vector<RigidBody>& bodies
   remember(others, contacts, out);
 }
 
-// All contacts, here and in the other solver: the next time they may be in islands of the other
-// kind, and a run that goes on from a saved state finds the same.
+// Keeps the impulses of all contacts here and in the other solver. In the next solve a contact may
+// be in an island of the other kind, and saved states contain one memory.
 void ConeIslands::remember(BodySolver& others, const std::vector<PointContact>& contacts,
                            const BodySolution& out) {
   memory_.keep(contacts, out.impulses);
@@ -188,8 +188,8 @@ void ConeIslands::remember(BodySolver& others, const std::vector<PointContact>& 
   others.set_warm_start(start_);
 }
 
-// Moves that take penetrations back have no friction of any kind. The first islands of a run of
-// steps are those of its velocities; others are of impacts and of what they close.
+// Position corrections have no friction. The islands made first are those of the velocity solve,
+// whose moments are reported; later ones serve impacts and the closing of gaps.
 std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions& options, LawUse laws) {
   if (laws == LawUse::limits) return nullptr;
   return std::make_unique<ConeIslands>(mechanisms_, nullptr, laws, options, &near_,

@@ -13,12 +13,12 @@
 
 namespace tether::contact::detail {
 
-/// Islands with a mechanism in them, or with a meeting that names rolling or torsional friction.
+/// Solves islands that have a mechanism, or contacts with rolling or torsional friction.
 class ConeIslands final : public JointIslands {
  public:
-  /// The mechanisms belong to the joints of the stepper, and are as they left them last; without
-  /// joints `laws` is null, and they are made here. Contacts of meetings of `near` (null: of none)
-  /// hold moments, told to `moments` (of all contacts of a solve, world axes, N m s; null: nobody).
+  /// The mechanisms belong to the joints of the stepper, which update them; without joints `laws`
+  /// is null. near: meetings whose contacts hold moments; null: none. moments: receives the moments
+  /// of all contacts of a solve, world axes, N m s; may be null.
   ConeIslands(Mechanisms& mechanisms, LawRows* laws, LawUse use, const BodyOptions& options,
               const NearContacts* near, std::vector<Eigen::Vector3d>* moments);
 

@@ -10,8 +10,8 @@ namespace tether::contact::detail {
 
 namespace {
 
-// Part of a way beyond a limit that a step takes back. What rows of the start of a step leave of it
-// is of second order in the step.
+// Part of a displacement beyond a limit that a step reduces. It arises because rows of the start of
+// a step are exact to second order only.
 constexpr double kTakenBack = 0.2;
 constexpr double kHeldByBound = 1 - 1e-9;
 
@@ -36,8 +36,8 @@ int LawRows::moving(int law, const Mechanisms& mechanisms) const {
   return mechanisms.moves(t->body) ? t->body : t[1].body;
 }
 
-// Strikes: what closes within the step, and faster than forces bring it there in one. The whole
-// impact is now, as that of a contact; a slower approach closes the gap first.
+// A limit is struck if its gap closes within the step, and faster than the forces of one step could
+// close it. It then takes its whole impact now, as a contact does; slower ones close the gap first.
 void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanisms& mechanisms) {
   dt_ = dt;
   strikes.clear();
@@ -63,7 +63,7 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
     if (hits)
       strikes.push_back(
           {law.gap, came, comes, moving_along(k), moving(k, mechanisms), law.restitution});
-    // A body that turns throws what is at its limit beyond it, and against it, in every step.
+    // On a turning body rounding of the step drives a joint at its limit beyond it and back.
     const double beyond = kTakenBack * std::min(law.gap, 0.0) / dt;
     plastic_bias_[at(k)] = hits || law.gap < 0 ? beyond : law.gap / dt;
     bias_[at(k)] = hits ? std::min(-law.restitution * came, beyond) : plastic_bias_[at(k)];

@@ -14,9 +14,9 @@ namespace tether::contact::detail {
 /// A limit is the cone x >= 0, a bounded law |x| <= bound dt, a sprung one a compliant row.
 class LawRows {
  public:
-  /// Start of a sub-step: the speeds that bodies come with, before its forces.
+  /// Keeps the velocities at the start of a sub-step, before its forces.
   void remember(const std::vector<Vector6d>& v) { coming_ = v; }
-  /// Afterwards: the laws at its start, and the velocities that its forces leave.
+  /// Prepares the laws at the start of the sub-step; v: velocities after its forces.
   void prepare(const std::vector<Vector6d>& v, double dt, const Mechanisms& mechanisms);
   /// A body of the law that moves.
   int moving(int law, const Mechanisms& mechanisms) const;
@@ -34,9 +34,9 @@ class LawRows {
   }
   bool any(LawUse use) const { return active && use != LawUse::none && laws.count() > 0; }
   std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
-  /// Problems of limits move positions, from rest.
+  /// The cone of a law; with LawUse::limits for a correction of positions.
   BodyCone cone(int law, LawUse use) const;
-  /// From the impulse of the last step; null: there is none.
+  /// Starting impulse from that of the last step; null: there is none.
   double start(int law, const Eigen::Vector3d* last) const;
   /// v: at the end of the sub-step.
   LawState state(int law, const std::vector<Vector6d>& v) const;

@@ -15,11 +15,10 @@ namespace tether::contact::detail {
 
 namespace {
 
-// Part of the largest speed that the rows of a mechanism see: above what rounding leaves of rows
-// that depend on each other, below any motion that somebody has meant.
+// Rows contradict each other above this part of the largest speed in the rows of their mechanism:
+// above the rounding of dependent rows, below any intended motion.
 constexpr double kContradiction = 1e-7;
-// The squares of smaller speeds vanish, and nothing relative is left: what comes to rest passes
-// there.
+// The squares of smaller speeds underflow, so that relative errors lose their meaning.
 constexpr double kLeastScale = 1e-150;
 
 using linalg::at;

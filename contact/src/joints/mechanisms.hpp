@@ -10,7 +10,7 @@
 
 namespace tether::contact::detail {
 
-/// The mechanisms of a set of bodies; which there are is found once for a pattern of rows.
+/// The mechanisms of a set of bodies; they are found once for each pattern of rows.
 class Mechanisms {
  public:
   /// Factors of the rows, for bodies of these inverse masses. Throws std::invalid_argument on rows

@@ -13,11 +13,11 @@
 
 namespace tether::contact::detail {
 
-/// method, section 8. A step starts on the joints, G v = rate. With the rows G of its start, joint
-/// impulses make its end meet g = 0 (as SHAKE does): first without contacts, so that contacts solve
-/// for velocities that the joints allow, then for what the contacts have changed. Velocities are
-/// put onto the rows of the end (RATTLE). All of these are impulses along G': linear and angular
-/// momentum of a mechanism that nothing else holds stay.
+/// Joints in a step (method, section 8), which starts with G v = rate. Impulses along the rows G of
+/// its start make its end meet g = 0 (SHAKE): first without contacts, so that the contact problem
+/// has velocities that the joints allow, then for the changes by contacts. Finally velocities are
+/// projected onto the rows of the end (RATTLE). All impulses act along G', so free mechanisms keep
+/// their linear and angular momentum.
 class StepJoints final : public JointPart {
  public:
   StepJoints(std::unique_ptr<JointEquations> equations, const BodySet& bodies,
@@ -33,12 +33,12 @@ class StepJoints final : public JointPart {
   }
   const std::vector<Eigen::Vector3d>& moments() const override { return moments_; }
 
-  /// Start of a step, before its forces: where the bodies have been moved from outside, they are
-  /// put back onto the joints by the least move, and their velocities. Throws std::invalid_argument
-  /// on joints that contradict each other.
+  /// Called at the start of a step, before its forces. Positions and velocities that the caller has
+  /// changed are put back onto the joints by the least change. Throws std::invalid_argument on
+  /// joints that contradict each other.
   void begin(BodySet& bodies, double t) override;
-  /// Before the contacts are solved: velocities that meet the joints at the end of the step. False:
-  /// these have not been found, as where the step is too long.
+  /// Called before the contacts are solved: velocities that meet the joints at the end of the step.
+  /// False: none were found, for instance because the step is too long.
   bool predict(BodySet& bodies, double t, double dt) override;
   const std::vector<Vector6d>& bend() const override { return bend_; }
   /// Makes the least move back onto the joints if something has moved the bodies since begin().
@@ -81,8 +81,8 @@ class StepJoints final : public JointPart {
   }
 
  private:
-  // Moves in parts of the size of the mechanism, root of mass times square of the distance from the
-  // origin: they end an iteration, and may be left where it does not go on.
+  // Relative to the size of the mechanism, the root of mass times squared distance from the origin:
+  // an iteration ends at a move of kNoMove, and is accepted below kMet if it stalls.
   static constexpr double kNoMove = 1e-14, kMet = 1e-11;
   static constexpr double kHalving = 0.5;  // a move that is longer does not converge
   static constexpr int kMoves = 30;

@@ -34,7 +34,7 @@ double StepJoints::size(const BodySet& bodies) const {
   return std::sqrt(sum);
 }
 
-// change_ becomes the least change of positions, over `dt`, that takes back g at time t; returns
+// Sets change_ to the least change of positions, over `dt`, that makes g vanish at time t. Returns
 // its length in the metric of the masses.
 double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
   equations_->values(bodies, t, row_.g.data());
@@ -55,8 +55,8 @@ double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
   return std::sqrt(square);
 }
 
-// Rounding of g asks for moves that do not end where rows lose their rank, as those of a closed
-// chain whose links lie on one line.
+// Whether g is rounding. Where rows lose rank, as in a closed chain whose links lie on one line,
+// rounding of g would cause moves without end.
 bool StepJoints::is_rounding(const BodySet& bodies) const {
   double largest = 0;
   for (const int i : held_)
