@@ -52,7 +52,7 @@ class Comparison {
       if (unsolved == 2) break;  // it will not reach tighter ones
       contact::Options options;
       options.law = law;
-      // Siconos stops by its natural map, which hangs on units: ours does here, too.
+      // Siconos stops by its natural map, which depends on units: ours does here, too.
       if (law == Law::coulomb) options.measure = contact::Measure::natural_map;
       options.tolerance = tolerance;
       options.max_work = 1e9 * plan_.limit;

@@ -126,7 +126,7 @@ TEST_CASE("packings: 5300 contacts are solved by sweeps") {
 }
 
 // Sweeps do not come near: they leave 5e-4 and 9e-4 after 2.2e9. What is unstable under them is 10
-// to 50 contacts each, at a few places. When these are found hangs on rounding: 6e8 to 1.4e9 for
+// to 50 contacts each, at a few places. When these are found depends on rounding: 6e8 to 1.4e9 for
 // the same lattice with mu changed by 1e-13, so one of three may take longer.
 TEST_CASE("packings: parts that are unstable under sweeps follow them, 10600 contacts") {
   int found = 0;

@@ -309,7 +309,7 @@ TEST_CASE("stepping: the bouncing ball comes to rest at Zeno's time, of order 1"
 
 TEST_CASE("stepping: a hopper carries the weight of its grains, loses none, and empties") {
   // Four boxes at 45 degrees about a square outlet of 5 diameters, closed by the floor. Narrower
-  // ones may jam: whether an arch forms then hangs on the last bit.
+  // ones may jam: whether an arch forms then depends on the last bit.
   const double r = 0.05, dt = 2e-3, outlet = 10 * r, length = 1.2;
   Scene scene(dt);
   scene.options.tolerance = 1e-4;

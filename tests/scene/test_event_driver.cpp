@@ -63,7 +63,7 @@ TEST_CASE("event: an instant with events without end is refused by name") {
   const double end = 2 * c.end;
   DriverOptions options = c.options();
   Driver::Memory before;
-  // Two corners lift together; whether in one event or two hangs on rounding: with one of these
+  // Two corners lift together; whether in one event or two depends on rounding: with one of these
   // tolerances in two.
   long most = 0;
   const auto comes_upon_several = [&] {

@@ -45,7 +45,7 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
 }
 
 // Sweeps until the island is solved or an assembled problem is forecast to cost less. Sweeps that
-// max_work pays for are made in any case, more as long as they get on; max_sweeps end them where
+// max_work pays for are made in any case, more while they make progress; max_sweeps end them where
 // they are not cheaper than what would follow.
 void BodySolver::Implementation::iterate(int k, Team& team) {
   const Island& island = graph.islands[at(k)];

@@ -31,7 +31,7 @@ struct IslandResult {
   // Work that a Problem of it may take: sweeps are forecast to need more, or have ended. 0: none.
   double assembly = 0;
   double spent = 0;    // work of assemblies so far
-  bool ended = false;  // sweeps do not get on, or may not
+  bool ended = false;  // sweeps make no progress, or may not
   bool assembled = false;
   bool saved = false;  // an earlier point was the best and is unpacked already
 };

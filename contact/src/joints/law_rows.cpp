@@ -63,7 +63,7 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
     if (hits)
       strikes.push_back(
           {law.gap, came, comes, moving_along(k), moving(k, mechanisms), law.restitution});
-    // On a turning body rounding of the step drives a joint at its limit beyond it and back.
+    // On a turning body every step drives a joint at its limit a little beyond it.
     const double beyond = kTakenBack * std::min(law.gap, 0.0) / dt;
     plastic_bias_[at(k)] = hits || law.gap < 0 ? beyond : law.gap / dt;
     bias_[at(k)] = hits ? std::min(-law.restitution * came, beyond) : plastic_bias_[at(k)];

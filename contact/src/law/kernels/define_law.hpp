@@ -35,7 +35,7 @@ TETHER_INLINE Regime solve_block(const LocalBlock& block, const double* b, doubl
   Squares group_pass(const BodyArrays&, GeneralGroup*, GeneralGroup*, Coupled) { return {}; }
 #endif
 
-// All kernels of the law L with the lanes Lanes, built for the machine at hand, in an unnamed
+// All kernels of the law L with the lanes Lanes, chosen for the processor, in an unnamed
 // namespace of tether::contact::detail.
 #define TETHER_LAW_KERNELS(L, Lanes)                                                               \
   TETHER_CLONES Regime solve(const LocalBlock& block, const double* b, double* x, double& lambda,  \

@@ -97,7 +97,7 @@ void ContactRows::free_held() {
   }
 }
 
-// Rows of unit length: which of them depend on others hangs on no mass.
+// Rows of unit length: whether one depends on others does not depend on masses.
 void ContactRows::look_at_joints() {
   scale_.setOnes(G_.rows());
   for (int i = 0; i < G_.rows(); ++i) {
