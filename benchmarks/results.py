@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes benchmarks/results/*.md: what a command prints, with commit, machine and date. SPDX-License-Identifier: BSD-3-Clause
 
-    python3 benchmarks/results.py [NAME...]      # all of them take an hour; --list names them
+    python3 benchmarks/results.py [NAME...]      # all of them take an hour; --list names them, --index only lists what there is
 
 Programs are those of build/release. Contact problems are looked for in TETHER_CONTACT_DATA. Comparisons of codes run with
 the SUNDIALS of TETHER_SUNDIALS or build/sundials, at -O3."""
@@ -19,7 +19,7 @@ BUILT = "build/release/benchmarks"
 TETHER = "build/release/scene/tether"
 # SUNDIALS at -O3, which codes of one method are compared with: the distribution's is not optimised.
 OPTIMISED = pathlib.Path(os.environ.get("TETHER_SUNDIALS") or ROOT / "build" / "sundials")
-COMPARED = {"instructions", "accuracy_cost", "crossover", "stability", "chain_cost"}
+COMPARED = {"instructions", "accuracy_cost", "dae_set", "crossover", "stability", "chain_cost"}
 # Name: title, how to read it, command from the root of the project.
 COMMANDS = {
     "pendulum": ("The pendulum of Hanson and Krogh",
@@ -32,6 +32,13 @@ COMMANDS = {
                       "Columns: [how to read accuracy_cost](../README.md#how-to-read-accuracy_cost). Below 1 Tether is faster.",
                       f"{BUILT}/accuracy/accuracy_cost --count 5 --repeats 2 --seconds 0.1 --no-drift --no-reach "
                       "--skip four_bar,long,chain_of_100 | sed -n '/^CPU at equal error/,$p'"),
+    "dae_set": ("The DAE problems of SciMLBenchmarks",
+                "Fourteen problems, each first in the form in which IDA is given it there; IDA refuses index 3. The first table counts "
+                "the tolerances at which a run ends, and compares Tether with the variant of IDA that has more digits: digits gained, "
+                "evaluations of F and time over IDA's. A cell of the others: significant digits of the worst component, steps, "
+                "evaluations of F, processor time in ms; \"limit\": beyond 8 s or 300000 steps. References: `examples/problems`. No NAND gate of theirs: it lacks the capacities of the "
+                "published one, which runs here.",
+                f"{BUILT}/accuracy/dae_set --repeats 1 --seconds 8 --svg benchmarks/results/dae_set"),
     "crossover": ("Where RADAU5's advantage on small smooth problems ends",
                   "Time and evaluations of F of Tether over those of RADAU5: below 1 Tether needs less.",
                   f"{BUILT}/accuracy/crossover --repeats 2"),
@@ -106,7 +113,24 @@ def write(name):
         f"- Date: {datetime.date.today().isoformat()}\n\n{text}\n")
 
 
+def index():
+    """results/index.md: every kept result with its command, and their pictures."""
+    lines = ["# Results", "", "Written by `python3 benchmarks/results.py --index`. [How to read them](../README.md).", "",
+             "| result | command |", "|---|---|"]
+    for file in sorted(RESULTS.glob("*.md")):
+        if file.name != "index.md":
+            title = file.read_text().split("\n", 1)[0].lstrip("# ")
+            command = f"`python3 benchmarks/results.py {file.stem}`" if file.stem in COMMANDS else "see the page"
+            lines.append(f"| [{title}]({file.name}) | {command} |")
+    for file in sorted(RESULTS.glob("*/*.svg")):
+        place = file.relative_to(RESULTS)
+        lines += ["", f"![{file.stem.replace('_', ' ')}: error against time]({place})"]
+    (RESULTS / "index.md").write_text("\n".join(lines) + "\n")
+
+
 def main(names):
+    if names == ["--index"]:
+        return index()
     if names == ["--list"]:
         return print("\n".join(f"{name:20} {command}" for name, (*_, command) in COMMANDS.items()))
     unknown = [name for name in names if name not in COMMANDS]
@@ -114,6 +138,7 @@ def main(names):
         return f"results.py: no result is called {unknown[0]}; there are {', '.join(COMMANDS)}"
     for name in names or COMMANDS:
         write(name)
+    index()
 
 
 if __name__ == "__main__":

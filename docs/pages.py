@@ -23,8 +23,8 @@ PARTS = (
                 "python/README.md", "linalg/README.md", "examples/README.md", "examples/drop_in/README.md"]),
     ("Methods", ["docs/method/projection.md", "docs/method/contact.md", "docs/method/detection.md",
                  "docs/method/events.md", "docs/glossary.md"]),
-    ("Results", ["benchmarks/README.md"] +
-     sorted(str(p.relative_to(ROOT)) for p in (ROOT / "benchmarks" / "results").glob("*.md"))),
+    ("Results", ["benchmarks/results/index.md", "benchmarks/README.md"] +
+     sorted(str(p.relative_to(ROOT)) for p in (ROOT / "benchmarks" / "results").glob("*.md") if p.stem != "index")),
     ("Project", ["CHANGELOG.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"]),
 )
 PAGES = {page for _, pages in PARTS for page in pages}

@@ -6,16 +6,24 @@
 #include <problems/andrews.hpp>
 #include <problems/bricard.hpp>
 #include <problems/car_axis.hpp>
+#include <problems/charge_pump.hpp>
+#include <problems/fekete.hpp>
 #include <problems/governor.hpp>
 #include <problems/kepler.hpp>
+#include <problems/linear_masses.hpp>
 #include <problems/link_chain.hpp>
 #include <problems/lotka_volterra.hpp>
+#include <problems/nand_gate.hpp>
+#include <problems/oregonator.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/pinned_rods.hpp>
 #include <problems/rigid_body.hpp>
 #include <problems/robertson.hpp>
 #include <problems/slider_crank.hpp>
 #include <problems/transistor_amplifier.hpp>
+#include <problems/two_bit_adder.hpp>
+#include <problems/water_tube.hpp>
+#include <problems/wheelset.hpp>
 #include <stdexcept>
 
 namespace tether::bench {
@@ -69,6 +77,33 @@ std::vector<Case> catalogue() {
       {"chain of 100",
        "hundred links falling, t = 0.5: sparse factors (KLU)",
        {link_chain(100, 0.5)}},
+  };
+}
+
+std::vector<Case> dae_set() {
+  using namespace problems;
+  return {
+      {"andrews", "squeezer of seven bodies",
+       in_forms({"index 3 w", "index 2", "index 1"}, [](auto& form) { return andrews(form); })},
+      {"car axis", "rheonomic, slightly stiff",
+       in_forms({"index 3", "GGL", "index 1"}, [](auto& form) { return car_axis(form); })},
+      {"slider crank", "stiff elastic modes without damping",
+       in_forms({"index 2", "index 1"}, [](auto& form) { return slider_crank(form); })},
+      {"fekete", "twenty points on a sphere come to rest",
+       in_forms({"GGL", "index 1"}, [](auto& form) { return fekete(form); })},
+      {"wheelset", "contact of wheel and rail, friction", {wheelset()}},
+      {"linear masses", "a rigid link, a force that jumps",
+       in_forms({"index 3", "index 2", "index 1"}, [](auto& form) { return linear_masses(form); })},
+      {"charge pump", "forty kinks of the voltage, index 2", {charge_pump()}},
+      {"water tube", "18 pipes, laminar and turbulent", {water_tube()}},
+      {"transistor amplifier", "singular constant mass matrix", {transistor_amplifier()}},
+      {"nand gate", "three transistors, kinks of the inputs",
+       in_forms(nand_gate_forms(), [](auto& form) { return nand_gate(form); })},
+      {"two-bit adder", "350 unknowns, kinks of the inputs", {two_bit_adder()}},
+      {"robertson", "chemistry over six decades of rates",
+       in_forms(robertson_forms(), [](auto& form) { return robertson(40.0, form); })},
+      {"akzo nobel", "chemistry with one equilibrium", {akzo_nobel()}},
+      {"oregonator", "an ordinary differential equation that keeps nothing", {oregonator()}},
   };
 }
 

@@ -72,6 +72,12 @@ inline std::string base_name(const std::string& code) {
 inline bool dense_enough(const problems::Problem& problem) { return problem.sparse.starts.empty(); }
 constexpr const char* kOnlyDense = "sparse problem, and its adapter has dense factors only";
 
+/// For codes that project.
+inline bool keeps_something(const problems::Problem& problem) {
+  return !problem.recommended.empty() || problem.sparse_constraints;
+}
+constexpr const char* kNothingKept = "its solution keeps nothing that could be projected";
+
 inline bool is_ours(const std::string& code) { return code.rfind("Tether", 0) == 0; }
 /// Plain IDA in any variant, "IDA fast" too.
 inline bool is_plain(const std::string& code) { return code.rfind("IDA", 0) == 0; }

@@ -21,6 +21,7 @@ class CpodesCode : public Code {
   std::string version() const override { return "of libsimbody"; }
   std::string refuses(const problems::Problem& problem) const override {
     if (!dense_enough(problem)) return kOnlyDense;
+    if (!keeps_something(problem)) return kNothingKept;
     // Simbody's vectors lack the minimum that CPodes wants of a tolerance for each component.
     if (!problem.atol_scale.empty()) return "takes one absolute tolerance only";
     return ExplicitForm(problem).ordinary() ? std::string() : "no ordinary differential equation";

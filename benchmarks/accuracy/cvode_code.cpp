@@ -104,6 +104,7 @@ class CvodeCode : public Code {
   }
   std::string refuses(const problems::Problem& problem) const override {
     if (!dense_enough(problem)) return kOnlyDense;
+    if (!keeps_something(problem)) return kNothingKept;
     return ExplicitForm(problem).ordinary() ? std::string() : "no ordinary differential equation";
   }
 

@@ -38,6 +38,8 @@ class IdaCode : public Code {
 
   std::string refuses(const problems::Problem& problem) const override {
     if (problem.index > 2) return "IDA is made for index 0, 1 and, with care, 2";
+    const bool projects = variant_ == Variant::projected || variant_ == Variant::smooth;
+    if (projects && !keeps_something(problem)) return kNothingKept;
     const bool algebraic = std::count(problem.id.begin(), problem.id.end(), 0.0) > 0;
     if (variant_ == Variant::suppressed && !algebraic) return "no algebraic variables";
     return {};

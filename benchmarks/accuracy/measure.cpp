@@ -10,22 +10,23 @@
 
 namespace tether::bench {
 
-namespace {
-
 double significant_digits(const problems::Problem& problem, const std::vector<double>& y) {
   double worst = 0.0, largest = 0.0;
   for (int i = 0; i < problem.error_components; ++i)
-    largest = std::max(largest, std::abs(problem.reference[static_cast<std::size_t>(i)]));
+    largest = std::fmax(largest, std::abs(problem.reference[static_cast<std::size_t>(i)]));
   for (int i = 0; i < problem.error_components; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const double expected = problem.reference[k];
-    if (std::abs(expected) <= 1e-12 * largest) continue;  // zero but for round-off
+    // Unknown, or zero but for round-off.
+    if (!(std::abs(expected) > 1e-12 * largest)) continue;
     const double relative = std::abs((y[k] - expected) / expected);
     if (!std::isfinite(relative)) return std::nan("");
     worst = std::max(worst, relative);
   }
   return worst > 0.0 ? -std::log10(worst) : 17.0;
 }
+
+namespace {
 
 // Follows the rows and the orders of a run; at the end `last` holds the drift that remained.
 class Recorder {

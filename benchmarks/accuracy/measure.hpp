@@ -33,6 +33,9 @@ struct Point {
   bool usable() const { return !run.failed && run.error == run.error; }
 };
 
+/// Digits of the worst compared component: -log10 of its relative error; NaN: not finite.
+double significant_digits(const problems::Problem& problem, const std::vector<double>& y);
+
 struct Plan {
   std::vector<double> tolerances;
   int repeats = 3;

@@ -31,13 +31,16 @@ ida_projection::Constraints Problem::recommended_constraints() const {
 
 double Problem::error(const double* y) const {
   double worst = 0.0;
+  int compared = 0;
   for (int i = 0; i < error_components; ++i) {
     const double expected = reference[static_cast<std::size_t>(i)];
+    if (std::isnan(expected)) continue;
+    ++compared;
     const double relative = std::abs(y[i] - expected) / (1.0 + std::abs(expected));
     if (!std::isfinite(relative)) return std::numeric_limits<double>::quiet_NaN();
     worst = std::max(worst, relative);
   }
-  return worst;
+  return compared > 0 ? worst : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace tether::problems

@@ -49,7 +49,7 @@ struct Problem {
   std::vector<Rows> rows;                ///< each group separately
   std::vector<std::string> recommended;  ///< groups to project by default
   std::vector<double> reference;         ///< y(t_end); NaN where unknown
-  int error_components = 0;              ///< the first so many components are compared
+  int error_components = 0;              ///< of the first so many those with a reference count
   std::vector<double> atol_scale;        ///< factors of the absolute tolerance; empty: all 1
   /// Index of each unknown in Hairer and Wanner's sense (1, 2 or 3; not decreasing), by which
   /// RADAU5 scales errors; empty: all 1.
@@ -60,8 +60,8 @@ struct Problem {
   ida_projection::Constraints select(const std::vector<std::string>& names) const;
   ida_projection::Constraints recommended_constraints() const;
 
-  /// max |y_i - reference_i| / (1 + |reference_i|) over the compared components; NaN if a
-  /// reference is unknown or y is not finite.
+  /// max |y_i - reference_i| / (1 + |reference_i|) over the compared components; NaN if
+  /// there are none or y is not finite.
   double error(const double* y) const;
 };
 

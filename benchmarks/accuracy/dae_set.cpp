@@ -1,0 +1,214 @@
+// Tether: the DAE problems of SciMLBenchmarks, by every code. SPDX-License-Identifier: BSD-3-Clause
+//
+//   dae_set [--problem P] [--tolerances 1e-4,1e-6] [--seconds S] [--repeats N] [--svg DIR]
+//
+// Prints Markdown: what projection gains over IDA alone, then each run's digits and work.
+#include <fmt/core.h>
+#include <sys/stat.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "report.hpp"
+
+using namespace tether::bench;
+
+namespace {
+
+const std::vector<std::string> kColumns = {"IDA",   "IDA suppressed",   "Tether",    "RADAU5",
+                                           "DASPK", "DASPK suppressed", "CVODE+proj"};
+
+struct Cell {
+  bool ran = false;    // the code takes this form
+  bool stuck = false;  // it, or a run at a looser tolerance, hit the limits
+  Run run;
+  double digits = std::nan("");
+  bool good() const { return ran && !run.failed && std::isfinite(digits); }
+};
+
+// By code, then by tolerance.
+using Runs = std::map<std::string, std::vector<Cell>>;
+
+std::string text(const Cell& cell) {
+  if (!cell.ran) return "";
+  if (cell.stuck) return "limit";
+  if (!cell.good()) return "fails";
+  return fmt::format("{:.1f}, {}, {}, {:.3g}", cell.digits, cell.run.steps, cell.run.residuals,
+                     cell.run.cpu_ms);
+}
+
+// A run that hit the limits is not tried at tighter tolerances.
+Runs run_all(const tether::problems::Problem& problem, const Codes& codes,
+             const std::vector<double>& tolerances, const Limits& limits, int repeats) {
+  Runs runs;
+  for (const auto& code : codes) {
+    std::vector<Cell>& cells = runs[code->name()];
+    cells.resize(tolerances.size());
+    if (!code->missing().empty() || !code->refuses(problem).empty()) continue;
+    bool stuck = false;
+    for (std::size_t k = 0; k < cells.size(); ++k) {
+      Cell& cell = cells[k];
+      cell.ran = true;
+      cell.run.failed = true;
+      std::vector<double> cpu;
+      for (int repeat = 0; repeat < repeats && !stuck; ++repeat) {
+        cell.run = code->run(problem, tolerances[k], limits, {});
+        cpu.push_back(cell.run.cpu_ms);
+        stuck = cell.run.failed &&
+                (cell.run.steps >= limits.steps || cell.run.cpu_ms > 999.0 * limits.cpu_seconds);
+        if (cell.run.failed || cell.run.cpu_ms > 100.0) break;
+      }
+      cell.stuck = stuck;
+      if (cell.run.failed) continue;
+      cell.run.cpu_ms = median(cpu);
+      cell.digits = significant_digits(problem, cell.run.y);
+    }
+  }
+  return runs;
+}
+
+std::string solved(const std::vector<Cell>& cells) {
+  if (cells.empty() || !cells.front().ran) return "-";
+  return fmt::format(
+      "{}", std::count_if(cells.begin(), cells.end(), [](const Cell& c) { return c.good(); }));
+}
+
+// Digits, F and time of ours beside the variant of IDA with more digits, where both run.
+std::vector<std::string> summary(const Runs& runs) {
+  const auto &ours = runs.at("Tether"), &one = runs.at("IDA"), &other = runs.at("IDA suppressed");
+  double digits = 0.0;
+  GeometricMean evaluations, time;
+  bool only_ours = false, only_theirs = false;
+  for (std::size_t k = 0; k < ours.size(); ++k) {
+    const Cell& ida =
+        !other[k].good() || (one[k].good() && one[k].digits > other[k].digits) ? one[k] : other[k];
+    only_ours = only_ours || (ours[k].good() && !ida.good() && !one[k].stuck && !other[k].stuck);
+    only_theirs = only_theirs || (ours[k].ran && !ours[k].good() && !ours[k].stuck && ida.good());
+    if (!ours[k].good() || !ida.good()) continue;
+    digits += ours[k].digits - ida.digits;
+    evaluations.add(static_cast<double>(ours[k].run.residuals) /
+                    static_cast<double>(ida.run.residuals));
+    time.add(ours[k].run.cpu_ms / ida.run.cpu_ms);
+  }
+  const int both = evaluations.count();
+  digits /= std::max(1, both);
+  const double worth = 0.3;  // digits, half of an error
+  const std::string verdict = !one.front().ran     ? "IDA and Tether refuse index 3"
+                              : !ours.front().ran  ? "nothing to project"
+                              : only_theirs        ? "fails where IDA runs"
+                              : only_ours          ? "runs where IDA fails"
+                              : both == 0          ? "neither runs"
+                              : digits > worth     ? "more digits"
+                              : digits < -worth    ? "fewer digits"
+                              : time.value() < 0.9 ? "faster"
+                                                   : "nothing gained";
+  const auto ratio = [&](const GeometricMean& of) {
+    return both > 0 ? fmt::format("{:.2f}", of.value()) : std::string("-");
+  };
+  return {solved(one),
+          solved(other),
+          solved(ours),
+          both > 0 ? fmt::format("{:+.1f}", digits) : "-",
+          ratio(evaluations),
+          ratio(time),
+          verdict};
+}
+
+void add_points(const std::string& form, const std::vector<double>& tolerances, const Runs& runs,
+                std::vector<Point>& points) {
+  for (const auto& [code, cells] : runs) {
+    for (std::size_t k = 0; k < cells.size(); ++k) {
+      if (!cells[k].good()) continue;
+      Point point;
+      point.form = form;
+      point.code = code;
+      point.tolerance = tolerances[k];
+      point.run = cells[k].run;
+      points.push_back(std::move(point));
+    }
+  }
+}
+
+std::string line(const std::vector<std::string>& cells) {
+  std::string out = "|";
+  for (const std::string& cell : cells) out += " " + cell + " |";
+  return out + "\n";
+}
+
+std::string head(const std::vector<std::string>& cells) {
+  std::string out = line(cells) + "|";
+  for (std::size_t k = 0; k < cells.size(); ++k) out += "---|";
+  return out + "\n";
+}
+
+Codes wanted_codes() {
+  Codes wanted, all = all_codes();
+  for (auto& code : all)
+    if (std::find(kColumns.begin(), kColumns.end(), code->name()) != kColumns.end())
+      wanted.push_back(std::move(code));
+  return wanted;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The DAE problems of SciMLBenchmarks, by every code");
+  std::vector<std::string> problems;
+  std::vector<double> tolerances = {1e-4, 1e-6, 1e-8, 1e-10};
+  double seconds = 10.0;
+  int repeats = 3;
+  std::string pictures;
+  app.add_option("--problem", problems, "Only problems whose name contains one of these")
+      ->delimiter(',');
+  app.add_option("--tolerances", tolerances, "From loose to tight")->delimiter(',');
+  app.add_option("--seconds", seconds, "CPU limit of one run")->check(CLI::PositiveNumber);
+  app.add_option("--repeats", repeats, "Runs of which the median time counts")
+      ->check(CLI::Range(1, 100));
+  app.add_option("--svg", pictures, "Folder for pictures, error against time");
+  CLI11_PARSE(app, argc, argv);
+  if (!pictures.empty()) mkdir(pictures.c_str(), 0777);
+
+  const Limits limits{300000, seconds};
+  const Codes codes = wanted_codes();
+  std::string table = head({"problem", "form", "IDA", "IDA suppressed", "Tether", "digits", "F",
+                            "time", "Tether beside IDA"});
+  std::string details;
+  for (const Case& which : dae_set()) {
+    if (!problems.empty() &&
+        std::none_of(problems.begin(), problems.end(), [&](const std::string& name) {
+          return which.name.find(name) != std::string::npos;
+        }))
+      continue;
+    fmt::print(stderr, "{}\n", which.name);
+    details += fmt::format("\n## {}: {}\n\n", which.name, which.text);
+    std::vector<std::string> columns = {"form", "tolerance"};
+    columns.insert(columns.end(), kColumns.begin(), kColumns.end());
+    std::string rows;
+    std::vector<Point> points;
+    for (const auto& problem : which.forms) {
+      Runs runs = run_all(problem, codes, tolerances, limits, repeats);
+      for (const std::string& column : kColumns) runs[column].resize(tolerances.size());
+      std::vector<std::string> cells = {which.name, problem.form};
+      for (std::string& cell : summary(runs)) cells.push_back(std::move(cell));
+      table += line(cells);
+      for (std::size_t k = 0; k < tolerances.size(); ++k) {
+        cells = {problem.form, fmt::format("{:.0e}", tolerances[k])};
+        for (const std::string& column : kColumns) cells.push_back(text(runs[column][k]));
+        rows += line(cells);
+      }
+      add_points(problem.form, tolerances, runs, points);
+    }
+    if (!pictures.empty()) {
+      std::string file = which.name + ".svg";
+      std::replace(file.begin(), file.end(), ' ', '_');
+      write_file(pictures + "/" + file, picture(which, points));
+      details += fmt::format("![error against time]({}/{})\n\n",
+                             pictures.substr(pictures.rfind('/') + 1), file);
+    }
+    details += head(columns) + rows;
+  }
+  fmt::print("{}{}", table, details);
+  return 0;
+}
