@@ -5,7 +5,7 @@
 #   layout.sh SOURCES PROGRAM      PROGRAM projects by one added call, linked to a static library
 set -eu
 for folder in attach constraints host movers rows start step watch; do
-  if grep -rn '#include "\(sensitivity\|c\|reverse\|preload\)/' "$1/$folder"; then
+  if grep -rn '#include "\(sensitivity\|distributed\|c\|reverse\|preload\)/' "$1/$folder"; then
     echo "$folder includes an add-on" >&2
     exit 1
   fi
@@ -13,7 +13,7 @@ done
 # Which symbols are there shows that names are seen at all.
 names=$(nm -C "$2" | grep -o 'tether::ida_projection::[A-Z][A-Za-z]*' | sort -u)
 echo "$names" | grep -q 'Mover$'
-for name in SensitivityCorrector ParameterDerivative; do
+for name in SensitivityCorrector ParameterDerivative DistributedStore GradientStore; do
   if echo "$names" | grep -q "::$name\$"; then
     echo "$2 has $name" >&2
     exit 1

@@ -344,4 +344,12 @@ Status Mover::take_back(const Candidate& candidate, double previous) {
   return Status::not_converged;
 }
 
+std::unique_ptr<Mover> make_vector_mover(const Constraints& constraints, const Options& options,
+                                         Statistics& statistics, N_Vector like) {
+  MakeRows make = make_user_rows;
+  if (const auto* rows = std::get_if<Gradients>(&constraints.jacobian)) make = rows->make;
+  if (const auto* rows = std::get_if<DistributedRows>(&constraints.jacobian)) make = rows->make;
+  return std::make_unique<Mover>(options, make(constraints, options, statistics, like));
+}
+
 }  // namespace tether::ida_projection

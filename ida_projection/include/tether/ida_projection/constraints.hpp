@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <string>
 #include <sundials/sundials_nvector.h>
 #include <tether/export.hpp>
@@ -55,6 +56,19 @@ class Callable {
   std::function<int(Arguments...)> call_;
 };
 
+class RowsAt;
+struct Constraints;
+struct Options;
+struct Statistics;
+/// Makes the storage of rows on vectors like `like`. Those that few programs need come with the
+/// rows that need them, so that a program links what it uses.
+using MakeRows = std::unique_ptr<RowsAt> (*)(const Constraints&, const Options&, Statistics&,
+                                             N_Vector like);
+std::unique_ptr<RowsAt> make_gradient_rows(const Constraints&, const Options&, Statistics&,
+                                           N_Vector like);  ///< of Gradients
+std::unique_ptr<RowsAt> make_distributed_rows(const Constraints&, const Options&, Statistics&,
+                                              N_Vector like);  ///< of DistributedRows
+
 /// C by forward differences: increment max(sqrt(eps) |y_j|, min(WT_j, 1e-4 max_i |y_i|)) in each
 /// column, WT_j the error weight rtol |y_j| + atol_j. Costs N evaluations of g for each C.
 struct FiniteDifferences {};
@@ -98,6 +112,7 @@ struct SparseJacobian {
 struct Gradients {
   Callable<double, N_Vector, double*> value;   ///< (t, y, g)
   Callable<double, N_Vector, N_Vector*> fill;  ///< (t, y, gradients)
+  MakeRows make = make_gradient_rows;          ///< their storage; not to be changed
 };
 
 /// Many rows with few entries each on vectors that are spread over processes: a net of rods on MPI
@@ -119,6 +134,7 @@ struct DistributedRows {
   Callable<ConstVector, Vector> update_ghosts;
   /// Adds what ghosts hold to the unknowns that they copy (second argument).
   Callable<ConstVector, Vector> add_ghosts;
+  MakeRows make = make_distributed_rows;  ///< their storage; not to be changed
 };
 
 /// The projection done by the caller, in the shape of CVODE's CVProjFn. From y at time t compute

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "movers/vector/vector_rows.hpp"
 #include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
@@ -118,6 +119,11 @@ double GradientStore::drift() const {
   double largest = 0.0;
   for (double g : g_) largest = std::max(largest, std::abs(g));
   return largest;
+}
+
+std::unique_ptr<RowsAt> make_gradient_rows(const Constraints& constraints, const Options& options,
+                                           Statistics& statistics, N_Vector like) {
+  return std::make_unique<VectorRows<GradientStore>>(constraints, options, statistics, like);
 }
 
 }  // namespace tether::ida_projection

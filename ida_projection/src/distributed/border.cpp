@@ -1,5 +1,5 @@
 // Tether: a few full rows beside many sparse ones. SPDX-License-Identifier: BSD-3-Clause
-#include "movers/vector/border.hpp"
+#include "distributed/border.hpp"
 
 #include <algorithm>
 #include <cmath>

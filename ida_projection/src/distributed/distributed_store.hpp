@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "constraints/evaluator.hpp"
-#include "movers/vector/border.hpp"
+#include "distributed/border.hpp"
 #include "movers/vector/rows_report.hpp"
 #include "movers/vector/vector_metric.hpp"
 

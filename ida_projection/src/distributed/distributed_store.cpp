@@ -1,12 +1,13 @@
 // Tether: rows that are spread over processes, as VectorMover wants them.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "movers/vector/distributed_store.hpp"
+#include "distributed/distributed_store.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <tether/linalg/index.hpp>
 
+#include "movers/vector/vector_rows.hpp"
 #include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
@@ -315,6 +316,12 @@ bool DistributedStore::contradict(N_Vector dy) {
   else
     report.contradicting(std::move(found), constraints_);
   return true;
+}
+
+std::unique_ptr<RowsAt> make_distributed_rows(const Constraints& constraints,
+                                              const Options& options, Statistics& statistics,
+                                              N_Vector like) {
+  return std::make_unique<VectorRows<DistributedStore>>(constraints, options, statistics, like);
 }
 
 }  // namespace tether::ida_projection
