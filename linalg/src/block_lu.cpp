@@ -25,7 +25,8 @@ TETHER_INLINE void subtract_apply(const double* A, const double* x, double* y) {
   *reinterpret_cast<v4*>(y) -= a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
 }
 
-// Rows in the order in which partial pivoting takes them; false: singular.
+// Factors a block with partial pivoting; `order` lists its rows as pivots. Returns false if it is
+// singular.
 bool factor(const double* A, BlockPivot& pivot) {
   double m[3][3];
   for (int r = 0; r < 3; ++r) {
@@ -56,8 +57,8 @@ bool factor(const double* A, BlockPivot& pivot) {
   return true;
 }
 
-// X = B D^-1. Not by way of an inverse: X D would miss B by cond(D) times the rounding, which for
-// contacts near their cones is all of it.
+// Computes X = B D^-1 by substitution. With a stored inverse, X D would differ from B by cond(D)
+// times the rounding, which is as large as B itself for contacts near the edge of their cones.
 TETHER_INLINE void divide(const double* B, const BlockPivot& d, double* X) {
   const v4* b = reinterpret_cast<const v4*>(B);
   v4* x = reinterpret_cast<v4*>(X);
@@ -70,7 +71,7 @@ TETHER_INLINE void divide(const double* B, const BlockPivot& d, double* X) {
   x[d.order[2]] = z2;
 }
 
-// y <- D^-1 y
+// Solves y <- D^-1 y.
 TETHER_INLINE void solve_pivot(const BlockPivot& d, double* y) {
   const double f0 = y[d.order[0]];
   const double f1 = y[d.order[1]] - d.l10 * f0;
@@ -81,7 +82,7 @@ TETHER_INLINE void solve_pivot(const BlockPivot& d, double* y) {
   y[3] = 0;
 }
 
-// y <- D'^-1 y
+// Solves y <- D^-T y.
 TETHER_INLINE void solve_pivot_transposed(const BlockPivot& d, double* y) {
   const double f0 = y[0] * d.reciprocal[0];
   const double f1 = (y[1] - d.u01 * f0) * d.reciprocal[1];
@@ -94,7 +95,7 @@ TETHER_INLINE void solve_pivot_transposed(const BlockPivot& d, double* y) {
   y[3] = 0;
 }
 
-// y -= A' x
+// Computes y <- y - A^T x.
 TETHER_INLINE void subtract_transposed(const double* A, const double* x, double* y) {
   for (int c = 0; c < 3; ++c) y[c] -= A[4 * c] * x[0] + A[4 * c + 1] * x[1] + A[4 * c + 2] * x[2];
 }
@@ -110,7 +111,7 @@ struct Rows {
   PackedBlock* work;
 };
 
-// Row elimination: work -= sum_k (work_k D_k^-1) U_k
+// Eliminates a row: work <- work - sum_k (work_k D_k^-1) U_k.
 TETHER_CLONES void eliminate(const Rows& s) {
   for (int m = 0; m < s.lower_count; ++m) {
     const int k = s.lower[m];
@@ -144,7 +145,7 @@ std::vector<int> elimination_order(const BlockPattern& pattern) {
   return order;
 }
 
-// Operations of an elimination whose factor has columns that start there.
+// Returns the block operations of an elimination whose factor has columns with these `starts`.
 double count_operations(const std::vector<int>& starts) {
   double operations = 0;
   for (std::size_t k = 0; k + 1 < starts.size(); ++k) {

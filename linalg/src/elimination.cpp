@@ -10,8 +10,8 @@ namespace tether::linalg {
 
 std::vector<int> minimum_degree_order(const BlockPattern& pattern) {
   const int n = pattern.size, entries = pattern.starts[n];
-  // Entry by entry, since Eigen's own copies ask for ascending columns, which the order does not
-  // need.
+  // Entries are inserted one by one: Eigen's own copies require ascending columns, which the order
+  // does not need.
   Eigen::SparseMatrix<double> whole(n, n);
   whole.resizeNonZeros(entries);
   std::copy(pattern.starts, pattern.starts + n + 1, whole.outerIndexPtr());
@@ -22,7 +22,8 @@ std::vector<int> minimum_degree_order(const BlockPattern& pattern) {
   return {permutation.indices().data(), permutation.indices().data() + n};
 }
 
-// Rows of column k: the later neighbours of k, and those of its children in the elimination tree.
+// The rows of column k are the later neighbours of k and those of its children in the elimination
+// tree.
 void find_fill(const BlockPattern& pattern, const std::vector<int>& order,
                const std::vector<int>& position, std::vector<int>& starts, std::vector<int>& rows) {
   const int n = static_cast<int>(order.size());

@@ -20,8 +20,8 @@ TETHER_INLINE void store(double* to, const v4_of_envelope& four) {
   std::memcpy(to, &four, sizeof four);
 }
 
-// Columns c[0 .. 3] of four rows, less what these rows and those of `above` share from column
-// `from` to `end`.
+// Subtracts from columns c[0 .. 3] of four rows the products of these rows with those of `above`,
+// summed over the columns from `from` to `end`.
 TETHER_INLINE void subtract_products(v4_of_envelope* c, const double* rows, const double* above,
                                      int from, int end) {
   v4_of_envelope c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3], entries;
@@ -38,8 +38,8 @@ TETHER_INLINE void subtract_products(v4_of_envelope* c, const double* rows, cons
   c[3] = c3;
 }
 
-// The four rows on the diagonal, `corner` their own columns. Rows of which no more than `least` is
-// left are left out; false: there is one, `least` is 0.
+// Factors the block on the diagonal of four rows. Leaves out rows whose diagonal entry is not above
+// `least`; returns false if there is one and `least` is 0.
 TETHER_INLINE bool factor_corner(double least, double* corner, double* diagonal, double* inverse) {
   for (int c = 0; c < kFour; ++c) {
     double* const column = corner + kFour * c;
@@ -58,7 +58,7 @@ TETHER_INLINE bool factor_corner(double least, double* corner, double* diagonal,
   return true;
 }
 
-// Four rows after the other, each against four columns at a time.
+// Factors four rows at a time, each time against four columns at a time.
 TETHER_CLONES bool factor_fours(double least, int count, const int* firsts,
                                 const std::ptrdiff_t* starts, double* L, double* diagonal,
                                 double* inverse) {

@@ -69,7 +69,7 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
   return true;
 }
 
-// All of them, also those that no C filled which came here.
+// Takes over all places known to the caller, also those that are zero in every C seen here.
 void KeptRows::learn(const FilledPlaces& wide, int width, const int* rows, const int* columns) {
   const int m = static_cast<int>(A_.size()) / n_;
   marks_.assign(static_cast<std::size_t>(width), 0.0);
@@ -121,7 +121,7 @@ bool KeptRows::planned(const int* order, int rank) const {
          std::equal(order_.begin(), order_.end(), order);
 }
 
-// The order of the factors, and the envelope of A A^T, from the places alone.
+// Finds the order of the factors and the envelope of A A^T, which depend on the places alone.
 void KeptRows::plan(const int* order, int rank) {
   planned_places_ = places_.known();
   order_.assign(order, order + rank);
@@ -156,7 +156,7 @@ void KeptRows::clear(int i) const {
   visit(i, [this](int j, double) { work_[static_cast<std::size_t>(j)] = 0.0; });
 }
 
-// Rows that share no column make no product.
+// Forms A A^T column by column of A: rows that share no column cost nothing.
 void KeptRows::multiply_by_columns(int rank) {
   std::fill(heads_.begin(), heads_.end(), -1);
   envelope_.clear();
@@ -230,7 +230,7 @@ void KeptRows::dependence(int i, int rank, double* x) const {
   solve_factored(rank, x);
 }
 
-// Twice: the first projection leaves rounding, magnified by the condition of A A^T.
+// Projects twice: the first projection leaves rounding, magnified by the condition of A A^T.
 void KeptRows::remainder(int i, int rank, double* z, double* left) const {
   std::fill(left, left + n_, 0.0);
   visit(i, [left](int j, double a) { left[j] = a; });

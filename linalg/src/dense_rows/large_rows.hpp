@@ -11,7 +11,7 @@
 
 namespace tether::linalg {
 
-// factor_kept(): A A^T determines the square of a larger sine to 1e-10 of itself.
+// Factors of A A^T determine the square of a larger sine to a relative error of 1e-10.
 constexpr double kLeastSine = 1e-3;
 
 struct MinimumNorm::Large {
@@ -20,7 +20,8 @@ struct MinimumNorm::Large {
   Eigen::VectorXd work, rhs;
   std::vector<int> order;  // pivot order
   KeptRows kept;           // of factor_kept() and factor_split()
-  // Scale of each row of C D to unit length, 1 where it vanishes; used if kept rows solve alone.
+  // The factor that brings each row of C D to unit length, 1 for a row that vanishes. It is used if
+  // kept rows solve alone.
   std::vector<double> to_unit;
   void learn_units(const std::vector<double>& row_norm);
 

@@ -126,7 +126,7 @@ void MinimumNorm::gather_large(const double* wide, int width, const int* rows, c
   }
 }
 
-// Rows of C to unit rows of C D.
+// Turns the rows of C into unit rows of C D. Returns false if an entry is not finite.
 bool MinimumNorm::scale_large() {
   auto& A = large_->A;
   const Eigen::Map<const Eigen::VectorXd> D(metric_.data(), n_);
@@ -143,7 +143,8 @@ bool MinimumNorm::scale_large() {
   return true;
 }
 
-// In the order in which factor_kept() looks at the rows; 0: they are not independent.
+// Returns the least independent part in the order that factor_kept() uses, or 0 if the rows are not
+// independent.
 double MinimumNorm::least_of_decided() {
   const double least = independent_part(rank_ - 1);
   if (kernel_ != nullptr || least < kLeastSine) return least;
@@ -245,7 +246,8 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
   kernel_->combine(s, rank_, z, metric_.data(), dy, n_);
 }
 
-// du = A^T (A A^T)^-1 b over the rows that take part; the others' inconsistency is b - A du.
+// Computes du = A^T (A A^T)^-1 b over the rows that take part. The inconsistency of the others is
+// their entry of |b - A du|.
 void MinimumNorm::solve_kept(const double* g, double* dy) {
   double* z = large_->rhs.data();
   const int* order = large_->order.data();

@@ -17,7 +17,7 @@ double* Remainders::add(int row) {
   return Q_.row(count_++).data();
 }
 
-// Gram-Schmidt, twice for the row at hand.
+// Gram-Schmidt, repeated for the pivot row.
 void Remainders::factor(double tolerance) {
   for (int k = 0; k < count_; ++k) {
     int pivot = k;

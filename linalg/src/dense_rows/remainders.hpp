@@ -6,28 +6,30 @@
 
 namespace tether::linalg {
 
-/// Rows that are orthogonal to all firm ones, made orthogonal to each other with pivoting:
-/// P R = L Q. resize() allocates, nothing else does.
+/// Remainders R of rows, orthogonal to all firm rows, which are factored by pivoted
+/// orthogonalisation: P R = L Q. Only resize() allocates.
 class Remainders {
  public:
-  /// At most so many. Memory is touched by what is used of it.
+  /// Reserves memory for at most so many; pages that stay unused are not touched.
   void resize(int rows, int columns);
 
   void begin() { count_ = rank_ = 0; }
-  /// Room for the remainder of row `row`, n entries.
+  /// Returns where to write the remainder of row `row`, n entries.
   double* add(int row);
-  /// Those longer than `tolerance` count. Afterwards row(k) is the k-th in pivot order.
+  /// Factors them; the rank counts those longer than `tolerance`. Afterwards row(k) is the k-th in
+  /// pivot order.
   void factor(double tolerance);
 
   int count() const { return count_; }
   int rank() const { return rank_; }
   int row(int k) const { return rows_[static_cast<std::size_t>(k)]; }
-  /// L_kk, k < rank(): no larger than the one before.
+  /// Returns L_kk for k < rank(); it is no larger than the one before.
   double independent_part(int k) const { return L_(k, k); }
 
-  /// For the first `rank` remainders: w = L^-1 rest, du += Q^T w; rest is overwritten.
+  /// Computes w = L^-1 rest and du <- du + Q^T w for the first `rank` remainders. Overwrites
+  /// `rest`.
   void add_solution(int rank, double* rest, double* du) const;
-  /// x with remainder k = sum_l x_l remainder l, l < rank, in the sense of least squares.
+  /// Finds x with remainder k = sum_l x_l remainder l, l < rank, by least squares.
   void dependence(int k, int rank, double* x) const;
 
  private:

@@ -35,7 +35,7 @@ void RowOrder::list_columns(const FilledPlaces& places) {
   for_places([this](int k, int& start) { owners_[static_cast<std::size_t>(--start)] = k; });
 }
 
-// Each neighbour of row k once, k itself not.
+// Visits each neighbour of row k once, without k itself.
 template <class Visit>
 void RowOrder::for_neighbours(int k, Visit visit) {
   visited_[static_cast<std::size_t>(k)] = ++visit_;
@@ -51,8 +51,8 @@ void RowOrder::for_neighbours(int k, Visit visit) {
   }
 }
 
-// Breadth first from `start`, rows with few neighbours first, into queue_[first ..]; returns its
-// end.
+// Lists the rows that are reached from `start` in queue_[first ..], breadth first, rows with few
+// neighbours first. Returns the end of the list.
 int RowOrder::reach(int start, int first) {
   int end = first;
   const auto take = [&](int k) {

@@ -13,7 +13,7 @@ typedef double v4 __attribute__((vector_size(32)));
 
 constexpr double kSmallestSquare = 1e-280, kLargestSquare = 1e280;
 
-// Columns of A D, in the order of the rows; places beyond m repeat the first row.
+// Gathers the columns of A = C D with the rows in their order. Lanes beyond m repeat the first row.
 template <int Lanes>
 TETHER_INLINE void gather(KeptRows& s, const Gathered& from, const int* order, int m, int n) {
   const double* c[4 * Lanes];
@@ -30,8 +30,8 @@ TETHER_INLINE void gather(KeptRows& s, const Gathered& from, const int* order, i
   }
 }
 
-// Columns 4 Block .. 4 Block + 3 of L, with U = diag(d) L^T beside it: column a is that of A A^T
-// less what the columns before it explain. Rows above the block need nothing.
+// Computes columns 4 Block .. 4 Block + 3 of L and of U^T = L diag(d): column a of U^T is that of
+// A A^T less the products of the columns before it. Rows above the block are skipped.
 template <int Lanes, int Block>
 TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m, int n,
                                 double least, double* square, double* ratio) {
@@ -62,14 +62,14 @@ TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m,
     s.inverse[a] = inverse;
     square[order[a]] = whole;
     ratio[a] = d / whole;
-    // One comparison for what is not a number, too.
+    // Written so that NaN fails, too.
     if (!(whole > kSmallestSquare && whole < kLargestSquare && d >= least * whole)) return false;
   }
   return true;
 }
 
-// Up to four rows: A A^T is summed while the columns are gathered, and no entry of it or of L is
-// taken out of memory where it has just been put.
+// Factors up to four rows. A A^T is summed while the columns are gathered, and no entry of it or of
+// L is loaded from memory just after it was stored.
 template <int Rows>
 TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* order, int n,
                               double least, double* square, double* ratio) {
@@ -97,7 +97,7 @@ TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* orde
     s.inverse[a] = inverse;
     square[order[a]] = whole;
     ratio[a] = d / whole;
-    // One comparison for what is not a number, too.
+    // Written so that NaN fails, too.
     good &= whole > kSmallestSquare && whole < kLargestSquare && d >= least * whole;
   }
   return good;

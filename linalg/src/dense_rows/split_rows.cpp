@@ -6,8 +6,9 @@
 
 namespace tether::linalg {
 
-// A^T = [A_f^T Q^T] [..], A_f the rows that keep a sine of kLeastSine to those before them, Q from
-// what A_f leaves of the others. False: that is not cheaper.
+// Factors A^T = [A_f^T Q^T] T with a triangular T up to order. A_f are the rows with a sine of at
+// least kLeastSine to the span of those before them; Q has orthonormal rows for the remainders of
+// the other rows, orthogonal to A_f. Returns false if that is not cheaper.
 bool MinimumNorm::factor_split(double rank_tolerance) {
   Large& large = *large_;
   KeptRows& kept = large.kept;
@@ -39,7 +40,7 @@ bool MinimumNorm::factor_split(double rank_tolerance) {
   return true;
 }
 
-// Other rows than the current factors have.
+// Refactorises if other rows take part than in the current factors.
 void MinimumNorm::limit_rank() {
   Large& large = *large_;
   if (large.split && rank_ >= large.firm) {
@@ -72,8 +73,8 @@ void MinimumNorm::solve_split(const double* g, double* dy) {
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
-// Row k is A_f^T x of the firm rows and what is left of it, which is made of what is left of
-// others.
+// Row k is a combination of the firm rows and its remainder, and this remainder is a combination of
+// the remainders of other rows.
 std::vector<double> MinimumNorm::dependence_split(int k) const {
   const Large& large = *large_;
   const int thin = rank_ - large.firm;

@@ -64,7 +64,7 @@ void BorderedGram::subtract(const double* y, double share, double* z) const {
   for (int i = 0; i < m_; ++i) z[i] -= share * y[i];
 }
 
-// The entries of L^-1 z that belong to the first `count` full rows.
+// Computes the entries of L^-1 z that belong to the first `count` full rows.
 void BorderedGram::forward_border(double* z, int count) {
   double* border = z + m_;
   for (int f = 0; f < count; ++f) {

@@ -13,14 +13,16 @@ namespace tether::linalg {
 ///     [ A A^T + eps I      A F^T      ]
 ///     [      F A^T     F F^T + eps I  ]
 ///
-/// with the sparse rows A first and the full rows F last, which would fill A A^T: L diag(d) L^T of
-/// their Schur complement F F^T + eps I - F A^T (A A^T + eps I)^-1 A F^T stands beside the sparse
-/// factors. Vectors z have the sparse rows' entries first. Otherwise as GramFactor.
+/// with the sparse rows A first and the full rows F last, since a full row makes A A^T full. The
+/// factors are those of A A^T + eps I and the L diag(d) L^T of the Schur complement
+/// F F^T + eps I - F A^T (A A^T + eps I)^-1 A F^T. Vectors z have the sparse rows' entries first.
+/// Functions are those of GramFactor.
 class BorderedGram {
  public:
   void analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns, int full);
 
-  /// Writable before factor(): A f for full row f; f . e for e <= f, which factor() overwrites.
+  /// To be written before factor(): A f for full row f, and f . e for e <= f, which factor()
+  /// overwrites.
   double* coupling(int f) {
     return B_.data() + static_cast<std::size_t>(f) * static_cast<std::size_t>(m_);
   }
@@ -31,8 +33,8 @@ class BorderedGram {
 
   double eps() const { return eps_; }
   int factor(const double* A, const double* norm, double eps, double thin);
-  /// z <- M^-1 z; returns |z| before the full rows' part was taken off it, 0 where there are none:
-  /// rounding of M z goes with that and with |z|.
+  /// Solves z <- M^-1 z. Returns |z| before the part of the full rows is subtracted, or 0 without
+  /// full rows: the rounding of M z is proportional to that length and to |z|.
   double solve(double* z);
   void forward(double* z);
   void depend(double* z, int last);

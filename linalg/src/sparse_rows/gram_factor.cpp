@@ -1,8 +1,8 @@
 // Tether: L diag(d) L^T of A A^T + eps I for sparse A. SPDX-License-Identifier: BSD-3-Clause
 //
-// Row by row ("up-looking"; T. A. Davis, Direct Methods for Sparse Linear Systems, section 4.8):
-// row k of L solves a triangular system with the rows above it. Neither A A^T nor a list of its
-// products is kept: row k of A meets the rows before it in the columns that they share.
+// L is found row by row ("up-looking"; T. A. Davis, Direct Methods for Sparse Linear Systems,
+// section 4.8): row k of L solves a triangular system with the rows above it. Neither A A^T nor a
+// list of its products is stored: row k of A A^T is summed over the columns of row k of A.
 #include "gram_factor.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 constexpr double kDependent = 16.0;  // eps (1 + |c|^2)
 constexpr double kThin = 1e6;        // eps
 constexpr int kTogether = 4;         // columns of L that are applied in one pass
-// The mean of so many squares is below a sixth of |c|^2 in one case of two hundred.
+// The mean of eight squares is below a sixth of |c|^2 in one case of two hundred.
 constexpr int kProbes = 8;
 constexpr double kDependentByProbes = 6.0;  // eps (1 + |c|^2)
 
@@ -31,7 +31,7 @@ struct FourColumns {
         L3(L + starts[j + 3]),
         row(rows + starts[j + 3]) {}
 
-  /// x_j to x_(j+3), in z, of L^T x = z, from x below them.
+  /// Solves L^T x = z for x_j to x_(j+3), which replace z, from the entries of x below them.
   void back(const double* __restrict x, int count, double* __restrict z) const {
     double x0 = z[0], x1 = z[1], x2 = z[2], x3 = z[3];
     for (int q = 0; q < count; ++q) {
@@ -79,7 +79,7 @@ void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vecto
   square_.reserve(at(m_));
 }
 
-// The pattern of A A^T: of each row first the rows before it, then itself and those after it.
+// Finds the pattern of A A^T, the columns of each row in ascending order.
 void GramFactor::find_gram(const std::vector<int>& starts, const std::vector<int>& columns,
                            std::vector<int>& gram_starts, std::vector<int>& gram_rows) const {
   std::vector<int> column_starts, rows, seen(at(m_), -1), passed(at(n_), 0);
@@ -128,7 +128,8 @@ void GramFactor::list_columns(const std::vector<int>& starts, const std::vector<
   PA_.value.assign(PA_.entry.size(), 0.0);
 }
 
-// Column j + 1 has the rows of column j without its own.
+// Counts for each column j the columns j, j + 1, ... of L in which each has the rows of the one
+// before it, without its own row.
 void GramFactor::find_supernodes() {
   L_.alike.assign(at(m_), 1);
   const auto length = [this](int j) {
@@ -139,7 +140,7 @@ void GramFactor::find_supernodes() {
       L_.alike[at(j)] = L_.alike[at(j + 1)] + 1;
 }
 
-// Row k of A times the rows before it, into work_.
+// Adds the products of row k of A with the rows before it to work_.
 void GramFactor::scatter_products(int k, const double* A) {
   double* __restrict y = work_.data();
   double* __restrict value = PA_.value.data();
@@ -153,7 +154,7 @@ void GramFactor::scatter_products(int k, const double* A) {
   }
 }
 
-// Row k of L from row k of A A^T in work_, which becomes zero again; returns d_k.
+// Computes row k of L from row k of A A^T in work_, which becomes zero again. Returns d_k.
 double GramFactor::eliminate(int k, double d) {
   double* __restrict y = work_.data();
   double* __restrict L = L_.value.data();
@@ -195,8 +196,9 @@ double GramFactor::eliminate(int k, double d) {
   return d;
 }
 
-// |c|^2, c the coefficients of row k over the rows before it: L_before^T c = row k of L. Only of
-// those that row k of L meets, which are enough where few rows depend on each other.
+// Returns |c|^2, where c are the coefficients of row k over the rows before it: L_before^T c is row
+// k of L. Only rows in the pattern of row k of L are counted, which suffices where few rows depend
+// on each other.
 double GramFactor::coefficients_square(int k) {
   double* __restrict x = work_.data();
   const double* __restrict L = L_.value.data();
@@ -235,7 +237,7 @@ int GramFactor::factor(const double* A, const double* norm, double eps, double t
   int count = 0;
   for (int k = 0; k < m_; ++k) {
     scatter_products(k, A);
-    // Without rounding d is at least eps.
+    // In exact arithmetic d is at least eps.
     const double d = std::max(eliminate(k, 1.0 + eps), eps);
     const bool looked_at = d <= std::max(kThin * eps, thin);
     const bool dependent = (looked_at && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
@@ -248,9 +250,11 @@ int GramFactor::factor(const double* A, const double* norm, double eps, double t
   return count + resolve_doubts();
 }
 
-// Thin rows that their nearest rows do not explain: the row that closes a long loop depends on all
-// of it. For z of independent components, mean 0 and variance 1, (c . z)^2 has the mean |c|^2, and
-// c . z = z_k - (L^-1 z)_k: one substitution serves all rows. Returns how many are dependent.
+// Decides about thin rows that do not depend on the rows in their own pattern alone: the row that
+// closes a long loop depends on all rows of the loop. |c|^2 is estimated at random: if z has
+// independent components of mean 0 and variance 1, (c . z)^2 has the mean |c|^2, and
+// c . z = z_k - (L^-1 z)_k, so that one substitution serves all rows. Returns how many are
+// dependent.
 int GramFactor::resolve_doubts() {
   if (doubtful_.empty()) return 0;
   square_.assign(doubtful_.size(), 0.0);
@@ -281,7 +285,8 @@ double GramFactor::independent_part(int i) const {
   return std::sqrt(std::max(0.0, 1.0 / inverse_d_[at(place_of(i))] - eps_));
 }
 
-// Four columns that are alike in one pass: each row index is read once and each x once.
+// Solves L x = b in place. Four columns with the same rows are applied in one pass, which reads
+// each row index and each entry of x once.
 void GramFactor::forward_in_place() {
   double* __restrict x = solution_.data();
   const double* __restrict L = L_.value.data();
@@ -306,7 +311,7 @@ void GramFactor::forward_in_place() {
   }
 }
 
-// D and L^T.
+// Solves diag(d) L^T x = b in place.
 void GramFactor::back_in_place() {
   double* __restrict x = solution_.data();
   const double* __restrict L = L_.value.data();
@@ -342,8 +347,9 @@ void GramFactor::solve(double* z) {
   for (int i = 0; i < m_; ++i) z[i] = solution_[at(place_of(i))];
 }
 
-// c = L^-T D^-1 L^-1 z over the rows before the last. A dependent row among them gives its share to
-// those that it depends on: leaving c_j out of the back substitution does just that.
+// Computes c = L^-T diag(d)^-1 L^-1 z over the rows before `last`. A dependent row among them
+// passes its share on to the rows on which it depends: this is what c_j = 0 in the back
+// substitution does.
 void GramFactor::depend(double* z, int last) const {
   const int count = last < 0 ? m_ : place_of(last);
   std::vector<double> x(at(m_), 0.0);

@@ -10,28 +10,28 @@ namespace tether::linalg {
 ///
 ///     d_k = eps + min_c |a_k - A_before^T c|^2 + eps |c|^2 ,   w_k = b_k - c . b_before ,
 ///
-/// c the coefficients of row k over the rows before it: d_k tells whether it depends on them, w_k
-/// whether b_k agrees with that combination of theirs.
+/// where c are the coefficients of row k over the rows before it. So d_k tells whether row k
+/// depends on these rows, and w_k whether b_k agrees with the same combination of their values.
 class GramFactor {
  public:
-  /// Rows in compressed form, n columns.
+  /// Finds order and pattern of L for rows of n columns in compressed form.
   void analyse(int n, const std::vector<int>& starts, const std::vector<int>& columns);
 
-  /// From the entries of A; norm[i] is 0 where row i is zero. Rows that are zero or have
-  /// d_k <= 16 eps count as dependent; where d_k <= thin (or 1e6 eps) those with
-  /// d_k <= 16 eps (1 + |c|^2) do. They take part all the same. Returns their number.
+  /// Factors from the entries of A; norm[i] is 0 where row i is zero. A row counts as dependent if
+  /// it is zero, or if d_k <= 16 eps (1 + |c|^2), which is tested where d_k <= max(thin, 1e6 eps).
+  /// Dependent rows stay in the factors. Returns their number.
   int factor(const double* A, const double* norm, double eps, double thin);
 
-  /// z <- (A A^T + eps I)^-1 z.
+  /// Solves z <- (A A^T + eps I)^-1 z.
   void solve(double* z);
-  /// z <- P^T L^-1 P z
+  /// Computes z <- P^T L^-1 P z.
   void forward(double* z);
-  /// z = A a, z.size() rows, becomes the coefficients of a over the independent rows before row
-  /// `last`, or over all independent rows if it is -1.
+  /// Turns z = A a, rows() entries, into the coefficients of a over the independent rows that come
+  /// before row `last` in the order, or over all independent rows if `last` is -1.
   void depend(double* z, int last) const;
 
   bool dependent(int i) const { return dependent_[static_cast<std::size_t>(place_of(i))] != 0; }
-  /// sqrt(d_k - eps) of row i
+  /// Returns sqrt(d_k - eps) for row i, the k-th of the order.
   double independent_part(int i) const;
   int rows() const { return m_; }
   long entries_of_factor() const { return static_cast<long>(L_.value.size()); }
@@ -49,14 +49,14 @@ class GramFactor {
   void forward_in_place();
   void back_in_place();
 
-  // P A by rows (where each entry is in A, and its column) and by columns (rows of P A, ascending,
-  // and the values of those that factor() has met).
+  // P A by rows (the index of each entry in A, and its column) and by columns (ascending rows of
+  // P A, and the values of those that factor() has reached).
   struct PermutedRows {
     std::vector<int> starts, entry, column;
     std::vector<int> member_starts, member, met;
     std::vector<double> value;
   };
-  // L by rows (which columns, ascending) and by columns (which rows, ascending, and the values).
+  // L by rows (ascending columns) and by columns (ascending rows, and the values).
   struct Triangle {
     std::vector<int> row_starts, row_columns, column_starts, column_rows, filled;
     std::vector<int> alike;  // columns from j on that have the rows of column j below them

@@ -26,14 +26,14 @@ void LeastNormSteps::resize(const UnitRows& rows) {
   for (std::vector<double>* v : {&b_, &left_, &z_, &Ap_, &MAp_}) v->assign(m, 0.0);
 }
 
-// left_ = b - A du; returns its length.
+// Computes left_ = b - A du and returns its length.
 double LeastNormSteps::find_left(const System& system) {
   system.rows.multiply(du_.data(), left_.data());
   for (std::size_t i = 0; i < left_.size(); ++i) left_[i] = b_[i] - left_[i];
   return std::sqrt(dot(left_.data(), left_.data(), left_.size()));
 }
 
-// z_ = M^-1 left_, step_ = A^T z_; returns |step_|.
+// Computes z_ = M^-1 left_ and step_ = A^T z_, and returns |step_|.
 double LeastNormSteps::find_step(const System& system) {
   z_ = left_;
   system.gram.solve(z_.data());
@@ -42,8 +42,9 @@ double LeastNormSteps::find_step(const System& system) {
   return std::sqrt(dot(step_.data(), step_.data(), step_.size()));
 }
 
-// The same from du = 0: b - A A^T z = eps z, and what rounding leaves of M z = b. True: that is
-// enough, and nothing has to be multiplied out. left_ then is eps z.
+// Takes the step from du = 0, z = M^-1 b. Its residual is b - A A^T z = eps z, up to the rounding
+// of M z = b. Returns true if their sum is below the tolerance: then no product with A is
+// needed, and left_ becomes eps z.
 bool LeastNormSteps::first_step(const System& system, double* left) {
   z_ = b_;
   const double before = system.gram.solve(z_.data()), eps = system.gram.eps();
@@ -56,7 +57,7 @@ bool LeastNormSteps::first_step(const System& system, double* left) {
   return true;
 }
 
-// Is the residual small enough, or does du no longer change?
+// Returns whether the residual is small enough, or du no longer changes.
 bool LeastNormSteps::done(double step, double left) const {
   const double length = std::sqrt(dot(du_.data(), du_.data(), du_.size()));
   return left <= tolerance_ * size_ + 2.0 * kEpsilon * length || step <= tolerance_ * length;
@@ -68,7 +69,8 @@ void LeastNormSteps::take_back(const System& system, double share, const std::ve
   *left = find_left(system);
 }
 
-// From du = 0. Returns false where more of them would reduce the residual too slowly.
+// Takes proximal steps from du = 0. Returns false if more of them would reduce the residual too
+// slowly.
 bool LeastNormSteps::proximal_steps(const System& system, double* left) {
   for (int k = 0; k < kProximalSteps; ++k) {
     const double before = *left;
@@ -82,7 +84,7 @@ bool LeastNormSteps::proximal_steps(const System& system, double* left) {
       step = std::sqrt(dot(du_.data(), du_.data(), du_.size()));
     }
     *left = find_left(system);
-    if (*left > before) {  // rounding rules: b has no part that the rows can give
+    if (*left > before) {  // rounding prevails: the rows give no more of b
       take_back(system, 1.0, step_, left);
       return true;
     }
@@ -92,8 +94,9 @@ bool LeastNormSteps::proximal_steps(const System& system, double* left) {
   return false;
 }
 
-// Least squares by conjugate gradients (Golub and Van Loan, section 11.3.9) in the norm of M^-1:
-// what proximal steps do, with the best multiple of each direction.
+// Minimises |b - A du| in the norm of M^-1 by conjugate gradients for least squares (Golub and Van
+// Loan, section 11.3.9). A proximal step goes along the same direction with the factor 1; here each
+// direction takes its best factor.
 void LeastNormSteps::gradient_steps(const System& system, double* left) {
   double square = std::pow(find_step(system), 2);
   p_ = step_;
@@ -108,7 +111,7 @@ void LeastNormSteps::gradient_steps(const System& system, double* left) {
     for (std::size_t j = 0; j < du_.size(); ++j) du_[j] += share * p_[j];
     for (std::size_t i = 0; i < z_.size(); ++i) z_[i] -= share * MAp_[i];
     *left = find_left(system);
-    if (*left > before) return take_back(system, share, p_, left);  // rounding rules
+    if (*left > before) return take_back(system, share, p_, left);  // rounding prevails
     system.rows.transposed(z_.data(), step_.data());
     const double next = dot(step_.data(), step_.data(), step_.size());
     if (done(std::sqrt(next), *left)) return;
@@ -145,9 +148,10 @@ void LeastMultipliers::resize(const UnitRows& rows) {
   z_.assign(static_cast<std::size_t>(rows.rows()), 0.0);
 }
 
-// Proximal steps on A A^T x = A u. Rounding of A (u - A^T x), over eps, stays in the null space of
-// A^T; x <- x - eps M^-1 x takes most of that away, and eps / s^2 of the rest, which further steps
-// bring back: they start from so small a residual that their own rounding counts for nothing.
+// Solves A A^T x = A u by proximal steps. They leave the rounding of A (u - A^T x), divided by eps,
+// in the null space of A^T. The filter x <- x - eps M^-1 x removes most of that. It also removes
+// the share eps / s^2 of the component at a singular value s, which the steps after it restore:
+// they start from so small a residual that their own rounding is negligible.
 void LeastMultipliers::find(const UnitRows& rows, BorderedGram& gram, double eps, const double* dy,
                             double* x) {
   const std::size_t m = z_.size();
@@ -162,7 +166,7 @@ void LeastMultipliers::find(const UnitRows& rows, BorderedGram& gram, double eps
   for (std::size_t i = 0; i < m; ++i) x[i] *= rows.inverse_norm(i);
 }
 
-// x <- x + M^-1 A (u - A^T x), D u = dy, as long as the steps halve.
+// Repeats x <- x + M^-1 A (u - A^T x), with D u = dy, as long as the steps halve.
 void LeastMultipliers::add(const UnitRows& rows, BorderedGram& gram, const double* dy, double* x) {
   const double* metric = rows.metric();
   const std::size_t m = z_.size();

@@ -9,19 +9,19 @@
 
 namespace tether::linalg {
 
-/// du of least norm with A du = b, by proximal steps du <- du + A^T M^-1 (b - A du), M = A A^T +
-/// eps I, and conjugate gradients where these become slow; see SparseMinimumNorm.
+/// Finds du of least norm with A du = b by proximal steps du <- du + A^T M^-1 (b - A du),
+/// M = A A^T + eps I, and by conjugate gradients where these become slow; see SparseMinimumNorm.
 class LeastNormSteps {
  public:
   void resize(const UnitRows& rows);
-  /// b_i = g_i / |row_i(C D)|. Stops at |b - A du| <= tolerance |b| + 4e-16 |du|.
+  /// Takes b_i = g_i / |row_i(C D)| and stops at |b - A du| <= tolerance |b| + 4e-16 |du|.
   void solve(const UnitRows& rows, BorderedGram& gram, const double* g, double tolerance);
 
-  /// A^T M^-1 b, valid until the next call.
+  /// Returns A^T M^-1 b, valid until the next call.
   const double* one(const UnitRows& rows, BorderedGram& gram, const double* g);
 
   const double* solution() const { return du_.data(); }
-  /// b - A du
+  /// The residual b - A du of the last solve().
   const std::vector<double>& left() const { return left_; }
   double residual() const { return residual_; }  ///< |b - A du| / |b|
   int iterations() const { return iterations_; }
@@ -46,11 +46,11 @@ class LeastNormSteps {
   int iterations_ = 0;
 };
 
-/// The least x with A^T x = u.
+/// Finds x of least norm with A^T x = u.
 class LeastMultipliers {
  public:
   void resize(const UnitRows& rows);
-  /// u = D^-1 dy; eps: of the factors.
+  /// Takes u = D^-1 dy; `eps` is that of the factors. Writes x for the rows of C, rows() entries.
   void find(const UnitRows& rows, BorderedGram& gram, double eps, const double* dy, double* x);
 
  private:

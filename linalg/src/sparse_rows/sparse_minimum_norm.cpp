@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSmallestEps = 1e-13;  // A A^T of unit rows carries some 1e-15 of rounding
 
-/// Which rows depend on others, and by how much they contradict them.
+/// The rows that depend on others, and how far their values contradict those of the others.
 class DependentRows {
  public:
   void resize(std::size_t rows) {
@@ -25,9 +25,9 @@ class DependentRows {
     inconsistency_.reserve(rows);
     work_.assign(rows, 0.0);
   }
-  /// After a factorisation that found so many.
+  /// Lists them after a factorisation that found `dependent` of them.
   void find(const BorderedGram& gram, int dependent);
-  /// After a solve that left b - A du, for the values g.
+  /// Measures the contradictions after a solve for the values g that left `left` = b - A du.
   void weigh(BorderedGram& gram, const UnitRows& rows, const std::vector<double>& left,
              const double* g);
 
@@ -55,7 +55,7 @@ void DependentRows::find(const BorderedGram& gram, int dependent) {
   std::copy(dropped_.begin(), dropped_.end(), order_.begin() + static_cast<std::ptrdiff_t>(kept));
 }
 
-// L^-1 (b - A du): entry k is the difference of row k from the combination of rows before it.
+// Entry k of L^-1 (b - A du) is the difference of row k from the combination of the rows before it.
 void DependentRows::weigh(BorderedGram& gram, const UnitRows& rows, const std::vector<double>& left,
                           const double* g) {
   inconsistency_.clear();
@@ -142,7 +142,7 @@ void SparseMinimumNorm::multipliers(const double* dy, double* x) {
   parts_->multipliers.find(parts_->rows, parts_->gram, parts_->eps, dy, x);
 }
 
-// Two rounds; the second one removes the error due to eps.
+// The second of two rounds removes the error due to eps.
 std::vector<double> SparseMinimumNorm::dependence(int k) const {
   Parts& p = *parts_;
   const int row = pivot(k);

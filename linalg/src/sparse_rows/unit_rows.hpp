@@ -14,9 +14,9 @@ double dot(const double* a, const double* b, std::size_t n);
 /// A = S C D, S = diag(1 / |row_i(C D)|), the sparse rows first; rows that vanish are zero.
 class UnitRows {
  public:
-  /// Throws std::invalid_argument for a pattern that makes no sense. Rows in compressed form.
+  /// Takes the sparse rows in compressed form. Throws std::invalid_argument for an invalid pattern.
   void resize(int columns, std::vector<int> starts, std::vector<int> column_of, int full_rows);
-  /// Sets up the factors for the pattern.
+  /// Prepares the factors for the pattern.
   void analyse(BorderedGram& gram) const;
 
   int rows() const { return sparse_ + full_; }
@@ -30,23 +30,23 @@ class UnitRows {
   double* metric() { return metric_.data(); }
   const double* metric() const { return metric_.data(); }
 
-  /// C to A. False: an entry is not finite.
+  /// Turns C into A. Returns false if an entry is not finite.
   bool scale();
-  /// A A^T + eps I; returns the number of dependent rows.
+  /// Factors A A^T + eps I and returns the number of dependent rows.
   int factor(BorderedGram& gram, double eps, double thin);
-  /// |row_i(C D)| and its inverse; 0 for a row that vanishes.
+  /// |row_i(C D)| and its inverse, both 0 for a row that vanishes.
   double norm(std::size_t i) const { return norm_[i]; }
   double inverse_norm(std::size_t i) const { return inverse_norm_[i]; }
 
-  /// z = A u
+  /// Computes z = A u.
   void multiply(const double* u, double* z) const;
-  /// u = A^T z
+  /// Computes u = A^T z.
   void transposed(const double* z, double* u) const;
-  /// Row i with all its entries.
+  /// Writes row i of A with all its entries.
   void spread(int i, std::vector<double>& row) const;
 
  private:
-  /// The sparse rows' entries by columns: which row, where in A_, and a copy of it.
+  /// The sparse rows' entries by columns: the row of each, its index in A_ and its value.
   struct Columns {
     std::vector<int> starts{0}, row, entry;
     std::vector<double> value;
