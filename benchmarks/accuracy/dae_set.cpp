@@ -21,8 +21,8 @@ const std::vector<std::string> kColumns = {"IDA",   "IDA suppressed",   "Tether"
                                            "DASPK", "DASPK suppressed", "CVODE+proj"};
 
 struct Cell {
-  bool ran = false;    // the code takes this form
-  bool stuck = false;  // it, or a run at a looser tolerance, hit the limits
+  bool ran = false;   // the code takes this form
+  bool late = false;  // it, or a run at a looser tolerance, took too long
   Run run;
   double digits = std::nan("");
   bool good() const { return ran && !run.failed && std::isfinite(digits); }
@@ -33,13 +33,13 @@ using Runs = std::map<std::string, std::vector<Cell>>;
 
 std::string text(const Cell& cell) {
   if (!cell.ran) return "";
-  if (cell.stuck) return "limit";
+  if (cell.late) return "limit";
   if (!cell.good()) return "fails";
   return fmt::format("{:.1f}, {}, {}, {:.3g}", cell.digits, cell.run.steps, cell.run.residuals,
                      cell.run.cpu_ms);
 }
 
-// A run that hit the limits is not tried at tighter tolerances.
+// A code that took too long is not tried at tighter tolerances.
 Runs run_all(const tether::problems::Problem& problem, const Codes& codes,
              const std::vector<double>& tolerances, const Limits& limits, int repeats) {
   Runs runs;
@@ -47,20 +47,19 @@ Runs run_all(const tether::problems::Problem& problem, const Codes& codes,
     std::vector<Cell>& cells = runs[code->name()];
     cells.resize(tolerances.size());
     if (!code->missing().empty() || !code->refuses(problem).empty()) continue;
-    bool stuck = false;
+    bool late = false;
     for (std::size_t k = 0; k < cells.size(); ++k) {
       Cell& cell = cells[k];
       cell.ran = true;
       cell.run.failed = true;
       std::vector<double> cpu;
-      for (int repeat = 0; repeat < repeats && !stuck; ++repeat) {
+      for (int repeat = 0; repeat < repeats && !late; ++repeat) {
         cell.run = code->run(problem, tolerances[k], limits, {});
         cpu.push_back(cell.run.cpu_ms);
-        stuck = cell.run.failed &&
-                (cell.run.steps >= limits.steps || cell.run.cpu_ms > 999.0 * limits.cpu_seconds);
+        late = cell.run.failed && cell.run.cpu_ms > 999.0 * limits.cpu_seconds;
         if (cell.run.failed || cell.run.cpu_ms > 100.0) break;
       }
-      cell.stuck = stuck;
+      cell.late = late;
       if (cell.run.failed) continue;
       cell.run.cpu_ms = median(cpu);
       cell.digits = significant_digits(problem, cell.run.y);
@@ -84,8 +83,8 @@ std::vector<std::string> summary(const Runs& runs) {
   for (std::size_t k = 0; k < ours.size(); ++k) {
     const Cell& ida =
         !other[k].good() || (one[k].good() && one[k].digits > other[k].digits) ? one[k] : other[k];
-    only_ours = only_ours || (ours[k].good() && !ida.good() && !one[k].stuck && !other[k].stuck);
-    only_theirs = only_theirs || (ours[k].ran && !ours[k].good() && !ours[k].stuck && ida.good());
+    only_ours = only_ours || (ours[k].good() && !ida.good() && !one[k].late && !other[k].late);
+    only_theirs = only_theirs || (ours[k].ran && !ours[k].good() && !ours[k].late && ida.good());
     if (!ours[k].good() || !ida.good()) continue;
     digits += ours[k].digits - ida.digits;
     evaluations.add(static_cast<double>(ours[k].run.residuals) /
