@@ -61,6 +61,10 @@ COMMANDS = {
                f"python3 benchmarks/mechanisms/iftomm.py {TETHER}"),
     "clearance": ("A slider-crank with clearance", "Work and error of the largest of three angles, rad, at the end.",
                   f"python3 benchmarks/clearance/clearance.py {TETHER}"),
+    "verify": ("Shipped scenes judged by an independent checker",
+               "At most 0.3 s of each scene, every step, by `scene/tools/verify.py`, which shares no code with Tether. Judgements are those of "
+               "contact forces, joints and balances of impulses.",
+               f"python3 scene/tools/verify.py examples/scenes/*.toml --tether {TETHER} --end 0.3"),
     "woodpecker": ("Glocker's woodpecker: events and steps at equal error",
                    "The largest distance (m) or angle (rad) of any body from a run with events at the least tolerance.",
                    f"{TETHER} cost examples/scenes/woodpecker.toml --tolerances 1e-3:1e-9 --accuracies 1e-3:1e-4"),
