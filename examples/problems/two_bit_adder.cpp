@@ -126,21 +126,16 @@ Eigen::VectorXd rest(const Circuit& c) {
     v[one.inner + 1] = v[one.drain];
     v[one.inner + 2] = v[one.inner + 3] = Circuit::kBulk;
   }
-  std::vector<Dual> at(kNodes), flows(kNodes);
   Eigen::MatrixXd J(kNodes, kNodes);
   Eigen::VectorXd f(kNodes);
   double step = 1e-3;
   for (int iteration = 0; iteration < 10; ++iteration) {
-    for (int i = 0; i < kNodes; ++i) at[static_cast<std::size_t>(i)] = v[i];
-    for (int j = 0; j < kNodes; ++j) {
-      at[static_cast<std::size_t>(j)].slope = 1.0;
-      currents(c, 0.0, at.data(), flows.data());
-      at[static_cast<std::size_t>(j)].slope = 0.0;
-      for (int i = 0; i < kNodes; ++i) {
-        J(i, j) = flows[static_cast<std::size_t>(i)].slope;
-        f[i] = flows[static_cast<std::size_t>(i)].value;
-      }
-    }
+    derivatives(
+        v.data(), kNodes, kNodes, [&](const Dual* at, Dual* flows) { currents(c, 0.0, at, flows); },
+        [&J](std::size_t i, std::size_t j, double slope) {
+          J(static_cast<int>(i), static_cast<int>(j)) = slope;
+        });
+    currents(c, 0.0, v.data(), f.data());
     J.diagonal().array() -= c.gate_capacity / step;
     const Eigen::VectorXd change = J.partialPivLu().solve(f);
     v.head(kNodes) -= change;
