@@ -5,6 +5,7 @@
 #   tether_compile_options(<target>)    warnings and instrumentation of the project, and the compiler's memory
 #   tether_executable(<target> SOURCES ... LIBRARIES ...)
 #   tether_library(<name>)       target tether_<name>, alias tether::<name>
+#   tether_list(<target> <macro> <file> <sources>...)  a list of sources for the preprocessor
 #   tether_by_folders(<target>)  with TETHER_UNITY_BUILD: the sources of a folder compile as one
 #   tether_precompile(<target> <header> ...)  with TETHER_UNITY_BUILD: compiled once for the target's sources
 #   TETHER_KEEP_BITS             options for sources whose rounding is part of their promise
@@ -73,6 +74,16 @@ function(tether_precompile target)
     # ccache asks for it.
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
   endif()
+endfunction()
+
+# Writes <file> with <macro>(name) for each source <name>.cpp, so that the list of sources is the list of what the
+# library has.
+function(tether_list target macro file)
+  list(TRANSFORM ARGN REPLACE "^.*/" "" OUTPUT_VARIABLE entries)
+  list(TRANSFORM entries REPLACE "^(.*)[.]cpp$" "${macro}(\\1)\n")
+  string(JOIN "" entries ${entries})
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${file} CONTENT "${entries}")
+  target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_BINARY_DIR})
 endfunction()
 
 function(tether_library name)

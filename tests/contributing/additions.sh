@@ -30,15 +30,15 @@ edit() {
   ! cmp -s "$1" "$work/before" || fail "$1 has another form"
 }
 
-# The list that scene/<folder>/CMakeLists.txt makes of its sources.
+# The list that <folder>/CMakeLists.txt makes of its sources.
 make_list() {
   {
     echo 'function(target_sources)'
     echo 'endfunction()'
     echo 'function(target_include_directories)'
     echo 'endfunction()'
-    sed -n '/^function(tether_scene_list/,/^endfunction/p' scene/CMakeLists.txt
-    echo "include(scene/src/$1/CMakeLists.txt)"
+    sed -n '/^function(tether_list/,/^endfunction/p' "$source/cmake/TetherTarget.cmake"
+    echo "include($1/CMakeLists.txt)"
   } >"$work/list.cmake"
   "$cmake" -P "$work/list.cmake"
 }
@@ -62,7 +62,7 @@ touches() {
 fresh
 like scene/src/effects/sleep.cpp scene/src/effects/doze.cpp 's/Sleep/Doze/g; s/(sleep,/(doze,/'
 edit scene/src/effects/CMakeLists.txt 's/^  sleep.cpp$/&\n  doze.cpp/'
-make_list effects
+make_list scene/src/effects
 compile doze scene/src/effects/doze.cpp scene/src/effects/list.cpp
 touches 2 'effect of scenes'
 
@@ -71,14 +71,14 @@ like scene/src/joints/kinds/ball.cpp scene/src/joints/kinds/pivot.cpp 's/Ball/Pi
 edit scene/src/joints/CMakeLists.txt 's,kinds/ball.cpp,& kinds/pivot.cpp,'
 edit scene/include/tether/scene/joint.hpp 's/universal, planar }/universal, planar, pivot }/; s/JointKind>, 7>/JointKind>, 8>/
   s/^    {"planar", .*/&\n    {"pivot", JointKind::pivot},/'
-make_list joints
+make_list scene/src/joints
 compile pivot scene/src/joints/kinds/pivot.cpp scene/src/joints/joint_type.cpp
 touches 3 'joint of scenes'
 
 fresh
 like scene/src/record/svg.cpp scene/src/record/xyz.cpp 's/Svg/Xyz/g; s/svg_format/xyz_format/; s/"[.]svg"/".xyz"/; s/"svg"/"xyz"/'
 edit scene/src/record/CMakeLists.txt 's/^  svg.cpp$/&\n  xyz.cpp/'
-make_list record
+make_list scene/src/record
 compile xyz scene/src/record/xyz.cpp scene/src/record/formats.cpp
 touches 2 'output of runs'
 
@@ -89,3 +89,14 @@ edit contact/src/law/laws.cpp 's,^#include "law/frictionless.hpp"$,&\n#include "
 edit contact/include/tether/contact/one_contact.hpp '/^enum class Law /,/};/s/frictionless/frictionless, glue/'
 compile Glue contact/src/law/glue.cpp contact/src/law/laws.cpp
 touches 4 'friction law'
+
+fresh
+for folder in contact/src/stepping/detection scene/src/geometry; do
+  like $folder/shapes/sphere.cpp $folder/shapes/pearl.cpp '/^Shape Shape::/,/^}/d; s/Sphere/Pearl/g; s/sphere/pearl/g'
+  make_list $folder
+done
+edit contact/include/tether/contact/shapes.hpp 's/^  mesh$/  mesh,\n  pearl/; s/ShapeKind, 9>/ShapeKind, 10>/
+  s/ShapeKind::mesh};/ShapeKind::mesh, ShapeKind::pearl};/'
+compile pearl contact/src/stepping/detection/shapes/pearl.cpp contact/src/stepping/detection/shape_form.cpp
+compile pearl scene/src/geometry/shapes/pearl.cpp scene/src/geometry/shape_type.cpp
+touches 3 'kind of shape'

@@ -8,18 +8,6 @@
 
 namespace tether::scene::files {
 
-/// All that is left of it, a block more than `most` bytes at most. By blocks: reading a folder, or
-/// a file that is truncated meanwhile, fails without a throw.
-inline std::string read_stream(std::istream& in, std::size_t most) {
-  std::string text;
-  std::vector<char> block(std::size_t{1} << 16);
-  while (in && text.size() <= most) {
-    in.read(block.data(), static_cast<std::streamsize>(block.size()));
-    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  return text;
-}
-
 /// One [[body]], but for the fields of effects.
 Body read_body(Fields& in, Reader& r);
 /// The scene of a whole document. Throws SceneError.

@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "effects/list.hpp"
+#include "geometry/shape_type.hpp"
 #include "options.hpp"
 #include "record/formats.hpp"
 #include "toml/writer.hpp"
@@ -19,33 +20,9 @@ using Keys = std::vector<std::pair<std::string, std::string>>;
 
 Keys shape_keys(const Shape& shape) {
   Keys keys{{"shape", toml_word(shape.kind)}};
-  switch (shape.kind) {
-    case ShapeKind::sphere:
-      keys.emplace_back("radius", toml(shape.radius));
-      break;
-    case ShapeKind::ellipsoid:
-      keys.emplace_back("half_axes", toml(shape.size));
-      break;
-    case ShapeKind::capsule:
-    case ShapeKind::cylinder:
-      keys.emplace_back("radius", toml(shape.radius));
-      keys.emplace_back("length", toml(shape.length));
-      break;
-    case ShapeKind::box:
-      keys.emplace_back("size", toml(shape.size));
-      break;
-    case ShapeKind::plane:
-      keys.emplace_back("normal", toml(shape.normal));
-      break;
-    case ShapeKind::convex:
-    case ShapeKind::points:
-      keys.emplace_back("points", toml(shape.points));
-      break;
-    case ShapeKind::mesh:
-      keys.emplace_back("points", toml(shape.points));
-      keys.emplace_back("triangles", toml(shape.triangles));
-      break;
-  }
+  for (const ShapeField& field : type_of(shape.kind).fields())
+    std::visit([&](auto member) { keys.emplace_back(field.key, toml(shape.*member)); },
+               field.value);
   return keys;
 }
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tether/linalg/convex_hull.hpp>
-#include <tether/linalg/pi.hpp>
 #include <tether/linalg/symmetric_eigen.hpp>
+
+#include "shape_type.hpp"
 
 namespace tether::scene {
 
@@ -13,113 +13,23 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using linalg::kPi;
 
 // |d|^2 1 - d d^T: the inertia of a unit point mass at d (parallel axes).
 Matrix3d point_inertia(const Vector3d& d) {
   return d.squaredNorm() * Matrix3d::Identity() - d * d.transpose();
 }
 
-MassProperties sphere(double r) {
-  const double volume = 4.0 / 3.0 * kPi * r * r * r;
-  return {volume, Vector3d::Zero(), 0.4 * volume * r * r * Matrix3d::Identity()};
-}
+}  // namespace
 
-// A box of these edges, an ellipsoid of these half axes: the mean square of a coordinate is a part
-// of that of its length.
 MassProperties along_axes(double volume, const Vector3d& lengths, double part) {
   const Vector3d s = lengths.cwiseProduct(lengths) / part;
   return {volume, Vector3d::Zero(),
           volume * Vector3d(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal()};
 }
 
-// Axis z.
-MassProperties cylinder(double r, double L) {
-  const double volume = kPi * r * r * L, across = volume * (r * r / 4 + L * L / 12);
-  return {volume, Vector3d::Zero(), Vector3d(across, across, volume * r * r / 2).asDiagonal()};
-}
-
-// Cylinder of length L and two half spheres, axis z.
-MassProperties capsule(double r, double L) {
-  const double cylinder = kPi * r * r * L, caps = 4.0 / 3.0 * kPi * r * r * r;
-  const double along = cylinder * r * r / 2 + caps * 0.4 * r * r;
-  const double across =
-      cylinder * (r * r / 4 + L * L / 12) + caps * (0.4 * r * r + L * L / 4 + 3.0 / 8.0 * L * r);
-  return {cylinder + caps, Vector3d::Zero(), Vector3d(across, across, along).asDiagonal()};
-}
-
-// Sums over tetrahedra with one corner at the origin: volume, first and second moments.
-struct Moments {
-  double volume = 0;
-  Vector3d first = Vector3d::Zero();
-  Matrix3d second = Matrix3d::Zero();
-
-  void add(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-    const double v = a.dot(b.cross(c)) / 6;
-    const Vector3d s = a + b + c;
-    volume += v;
-    first += v / 4 * s;
-    second +=
-        v / 20 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
-  }
-};
-
-MassProperties convex(const std::vector<Vector3d>& points) {
-  if (points.empty()) return {};
-  Vector3d origin = Vector3d::Zero();
-  for (const Vector3d& p : points) origin += p / static_cast<double>(points.size());
-  std::vector<Vector3d> p;
-  double size = 0;
-  for (const Vector3d& each : points) {
-    p.emplace_back(each - origin);
-    size = std::max(size, p.back().norm());
-  }
-  if (!(size > 0) || !std::isfinite(size)) return {};
-  for (Vector3d& each : p) each /= size;  // nothing below overflows
-
-  Moments sum;
-  for (const std::vector<std::size_t>& face : linalg::hull_faces(p))
-    for (std::size_t m = 1; m + 1 < face.size(); ++m)
-      sum.add(p[face[0]], p[face[m]], p[face[m + 1]]);
-  if (!(sum.volume > 1e-12)) return {};
-  MassProperties out;
-  const double cube = size * size * size;
-  const Vector3d centre = sum.first / sum.volume;
-  const Matrix3d second = sum.second - sum.volume * centre * centre.transpose();
-  out.volume = sum.volume * cube;
-  out.centre = origin + centre * size;
-  out.inertia = (second.trace() * Matrix3d::Identity() - second) * (cube * size * size);
-  return out;
-}
-
-}  // namespace
-
 MassProperties mass_properties(const Shape& shape) {
-  MassProperties out;
-  switch (shape.kind) {
-    case ShapeKind::sphere:
-      out = sphere(shape.radius);
-      break;
-    case ShapeKind::box:
-      out = along_axes(shape.size.prod(), shape.size, 12);
-      break;
-    case ShapeKind::capsule:
-      out = capsule(shape.radius, shape.length);
-      break;
-    case ShapeKind::ellipsoid:
-      out = along_axes(4.0 / 3.0 * kPi * shape.size.prod(), shape.size, 5);
-      break;
-    case ShapeKind::cylinder:
-      out = cylinder(shape.radius, shape.length);
-      break;
-    case ShapeKind::convex:
-      out = convex(shape.points);
-      break;
-    case ShapeKind::plane:
-    case ShapeKind::points:
-    case ShapeKind::mesh:
-      return {};
-  }
+  MassProperties out = type_of(shape.kind).solid(shape);
+  if (!(out.volume > 0)) return {};
   // Turning by the identity would only add rounding.
   if (shape.orientation.coeffs() != Eigen::Quaterniond::Identity().coeffs()) {
     const Matrix3d R = shape.orientation.toRotationMatrix();

@@ -6,23 +6,12 @@
 #include <tether/linalg/convex_hull.hpp>
 #include <tether/linalg/pi.hpp>
 
-namespace tether::scene {
+#include "shape_type.hpp"
 
-namespace {
+namespace tether::scene {
 
 using Eigen::Vector3d;
 
-Mesh box_mesh(const Vector3d& size) {
-  Mesh m;
-  for (int corner = 0; corner < 8; ++corner)
-    m.points.emplace_back(
-        Vector3d(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1).cwiseProduct(size) /
-        2);
-  m.faces = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
-  return m;
-}
-
-// Two half spheres, `length` apart along z; a sphere at length 0.
 Mesh capsule_mesh(double radius, double length, int around) {
   const int rings = std::max(2, around / 4);  // of each half, pole excluded
   const auto n = static_cast<std::size_t>(around);
@@ -55,36 +44,7 @@ Mesh capsule_mesh(double radius, double length, int around) {
   return m;
 }
 
-Mesh ellipsoid_mesh(const Vector3d& half_axes, int around) {
-  Mesh m = capsule_mesh(1, 0, around);
-  for (Vector3d& p : m.points) p = p.cwiseProduct(half_axes);
-  return m;
-}
-
-Mesh cylinder_mesh(double radius, double length, int around) {
-  const auto n = static_cast<std::size_t>(around);
-  Mesh m;
-  m.faces.resize(2);  // lower and upper end
-  for (const double z : {-length / 2, length / 2})
-    for (int k = 0; k < around; ++k) {
-      const double angle = 2 * linalg::kPi * k / around;
-      m.points.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
-    }
-  for (std::size_t k = 0; k < n; ++k) {
-    m.faces[0].push_back(n - 1 - k);
-    m.faces[1].push_back(n + k);
-    m.faces.push_back({k, (k + 1) % n, n + (k + 1) % n, n + k});
-  }
-  return m;
-}
-
-Mesh plane(const Vector3d& normal, double half) {
-  const Vector3d other = std::abs(normal.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
-  const Vector3d v = normal.cross(other).normalized() * half, u = v.cross(normal);
-  return {{-u - v, u - v, u + v, -u + v}, {{0, 1, 2, 3}}, {}};
-}
-
-Mesh points(const std::vector<Vector3d>& all) {
+Mesh points_mesh(const std::vector<Vector3d>& all) {
   Mesh m{all, linalg::hull_faces(all), {}};
   if (!m.faces.empty()) return m;
   m.single.resize(all.size());
@@ -92,43 +52,19 @@ Mesh points(const std::vector<Vector3d>& all) {
   return m;
 }
 
-Mesh surface(const Shape& shape) {
-  Mesh m{shape.points, {}, {}};
-  for (const std::array<int, 3>& t : shape.triangles)
-    m.faces.push_back({static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]),
-                       static_cast<std::size_t>(t[2])});
-  return m;
-}
-
-Mesh in_own_axes(const Shape& shape, int around, double half_plane) {
-  switch (shape.kind) {
-    case ShapeKind::sphere:
-      return capsule_mesh(shape.radius, 0, around);
-    case ShapeKind::capsule:
-      return capsule_mesh(shape.radius, shape.length, around);
-    case ShapeKind::ellipsoid:
-      return ellipsoid_mesh(shape.size, around);
-    case ShapeKind::cylinder:
-      return cylinder_mesh(shape.radius, shape.length, around);
-    case ShapeKind::box:
-      return box_mesh(shape.size);
-    case ShapeKind::plane:
-      return plane(shape.normal, half_plane);
-    case ShapeKind::convex:
-    case ShapeKind::points:
-      return points(shape.points);
-    case ShapeKind::mesh:
-      return surface(shape);
-  }
-  return {};
-}
-
-}  // namespace
-
 Mesh mesh(const Shape& shape, int around, double half_plane) {
-  Mesh m = in_own_axes(shape, around, half_plane);
+  Mesh m = type_of(shape.kind).polygons(shape, around, half_plane);
   for (Vector3d& p : m.points) p = shape.position + shape.orientation * p;
   return m;
+}
+
+double reach_of(const Body& body) {
+  double reach = 0;
+  for (const Shape& shape : body.shapes) {
+    if (shape.kind == ShapeKind::plane) return std::numeric_limits<double>::infinity();
+    for (const Vector3d& p : mesh(shape, 8, 0).points) reach = std::max(reach, p.norm());
+  }
+  return reach;
 }
 
 }  // namespace tether::scene

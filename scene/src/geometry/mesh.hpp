@@ -16,4 +16,8 @@ struct Mesh {
 /// `around`: segments of a circle. A plane is cut to a square of the given half edge.
 Mesh mesh(const Shape& shape, int around, double half_plane);
 
+/// The farthest point of the shapes of a body from its centre; infinite with a plane, 0 without
+/// shapes.
+double reach_of(const Body& body);
+
 }  // namespace tether::scene

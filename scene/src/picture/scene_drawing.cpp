@@ -5,7 +5,7 @@
 #include <tether/linalg/convex_hull.hpp>
 
 #include "axes.hpp"
-#include "geometry/mesh.hpp"
+#include "geometry/shape_type.hpp"
 #include "joints/joint_type.hpp"
 
 namespace tether::scene::picture {
@@ -40,16 +40,6 @@ Matrix3d eye_of(const Scene& scene, const std::vector<const Poses*>& motion) {
       std::sin(elevation);
   eye.row(1) = Vector3d(eye.row(2)).cross(Vector3d(eye.row(0)));
   return eye;
-}
-
-/// Reach of the shapes from the centre; below 0: there is a plane.
-double reach_of(const Body& body) {
-  double reach = 0;
-  for (const Shape& shape : body.shapes) {
-    if (shape.kind == ShapeKind::plane) return -1;
-    for (const Vector3d& p : mesh(shape, 8, 0).points) reach = std::max(reach, p.norm());
-  }
-  return reach;
 }
 
 constexpr std::size_t kMostPaths = 30, kMostNames = 12;
@@ -133,10 +123,8 @@ class Drawing {
         draw_plane(shape, pose);
         continue;
       }
-      const bool round = shape.kind == ShapeKind::sphere || shape.kind == ShapeKind::capsule ||
-                         shape.kind == ShapeKind::ellipsoid;
-      const bool curved = round || shape.kind == ShapeKind::cylinder;
-      const Mesh m = mesh(shape, curved ? 24 : 8, view_.half_plane());
+      const bool round = type_of(shape.kind).is_round();
+      const Mesh m = mesh(shape, 24, view_.half_plane());
       std::vector<Vector2d> points;
       for (const Vector3d& p : m.points) points.push_back(view_.pixel(pose.position + R * p));
       if (shape.kind == ShapeKind::mesh) {
@@ -436,7 +424,7 @@ View::View(const Scene& scene, const std::vector<const Poses*>& motion, const Bo
   };
   for (std::size_t b = 0; b < motion.front()->size(); ++b) {
     const double reach = reach_of(scene.bodies[b]);
-    if (reach < 0) continue;
+    if (std::isinf(reach)) continue;  // a plane
     for (const Poses* now : motion) take((*now)[b].position, reach);
   }
   for (const Joint& joint : scene.joints)

@@ -10,14 +10,10 @@ namespace {
 
 using Bodies = std::pair<int, int>;
 
-/// Farthest point of a body from its centre, m; planes, and points at the centre, have no size.
+/// Planes, and points at the centre, have no size.
 double size_of(const Body& body) {
-  double size = 0;
-  for (const Shape& shape : body.shapes) {
-    if (shape.kind == ShapeKind::plane) return HUGE_VAL;
-    for (const Eigen::Vector3d& p : mesh(shape, 8, 1).points) size = std::max(size, p.norm());
-  }
-  return size > 0 ? size : HUGE_VAL;
+  const double reach = reach_of(body);
+  return reach > 0 ? reach : HUGE_VAL;
 }
 
 /// Bodies and how they meet, without what moves them.

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "geometry/mesh.hpp"
+#include "geometry/shape_type.hpp"
 #include "joints/joint_type.hpp"
 
 namespace tether::scene::player {
@@ -24,12 +24,6 @@ Json wxyz(const Quaternion& q) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
 
-double reach(const Shape& shape) {
-  double out = 0;
-  for (const Vector3d& p : mesh(shape, 8, 0).points) out = std::max(out, p.norm());
-  return out;
-}
-
 /// Shapes of one form share it: spheres and boxes of every size, others that are equal.
 class Forms {
  public:
@@ -37,50 +31,25 @@ class Forms {
 
   /// Adds the number of the form and its scale to a part.
   void add_to(Json& part, const Shape& shape) {
-    Shape form;
-    form.kind = shape.kind;
-    Vector3d scale = Vector3d::Ones();
-    switch (shape.kind) {
-      case ShapeKind::sphere:
-        form.radius = 1;
-        scale.setConstant(shape.radius / view_.length);
-        return add(part, form, scale, true, false);
-      case ShapeKind::box:
-        form.size.setOnes();
-        scale = shape.size / view_.length;
-        return add(part, form, scale, false, false);
-      case ShapeKind::capsule:
-        form.radius = shape.radius;
-        form.length = shape.length;
-        return add(part, form, scale, true, true);
-      case ShapeKind::ellipsoid:
-        form.size = shape.size;
-        return add(part, form, scale, true, true);
-      case ShapeKind::cylinder:
-        form.radius = shape.radius;
-        form.length = shape.length;
-        return add(part, form, scale, false, true);
-      default:
-        form.points = shape.points;
-        form.triangles = shape.triangles;
-        return add(part, form, scale, false, true);
-    }
+    Shape form = shape;
+    form.position.setZero();
+    form.orientation.setIdentity();
+    const std::optional<Vector3d> size = type_of(shape.kind).make_unit(form);
+    const Mesh m = mesh(form, around_, 0);
+    Json points = Json::array();
+    for (const Vector3d& p : m.points)
+      points.push_back(player::list(size ? p : Vector3d(p / view_.length)));
+    const Json entry = {
+        {"points", points}, {"faces", m.faces}, {"round", type_of(shape.kind).is_round()}};
+    const auto [at, fresh] = known_.emplace(entry.dump(), known_.size());
+    if (fresh) list_.push_back(entry);
+    part["form"] = at->second;
+    part["scale"] =
+        player::list(size ? Vector3d(*size / view_.length) : Vector3d(Vector3d::Ones()));
   }
   const Json& list() const { return list_; }
 
  private:
-  void add(Json& part, const Shape& form, const Vector3d& scale, bool round, bool in_metres) {
-    const Mesh m = mesh(form, around_, 0);
-    Json points = Json::array();
-    for (const Vector3d& p : m.points)
-      points.push_back(player::list(in_metres ? Vector3d(p / view_.length) : p));
-    const Json entry = {{"points", points}, {"faces", m.faces}, {"round", round}};
-    const auto [at, fresh] = known_.emplace(entry.dump(), known_.size());
-    if (fresh) list_.push_back(entry);
-    part["form"] = at->second;
-    part["scale"] = player::list(scale);
-  }
-
   int around_;
   View view_;
   std::map<std::string, std::size_t> known_;
@@ -153,11 +122,8 @@ View view_of(const Scene& scene) {
   };
   double largest = 0;
   for (const Body& body : scene.bodies) {
-    const bool plane = std::any_of(body.shapes.begin(), body.shapes.end(),
-                                   [](const Shape& s) { return s.kind == ShapeKind::plane; });
-    if (plane) continue;
-    double around = 0;
-    for (const Shape& shape : body.shapes) around = std::max(around, reach(shape));
+    const double around = reach_of(body);
+    if (std::isinf(around)) continue;  // a plane
     largest = std::max(largest, around);
     take(body.position - Vector3d::Constant(around));
     take(body.position + Vector3d::Constant(around));

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <istream>
 #include <set>
 
 #include "fields.hpp"
@@ -56,6 +57,18 @@ struct Reader {
   }
   static const std::string& name_of(const Body& body) { return body.name; }
 };
+
+/// All that is left of it, a block more than `most` bytes at most. By blocks: reading a folder, or
+/// a file that is truncated meanwhile, fails without a throw.
+inline std::string read_stream(std::istream& in, std::size_t most) {
+  std::string text;
+  std::vector<char> block(std::size_t{1} << 16);
+  while (in && text.size() <= most) {
+    in.read(block.data(), static_cast<std::streamsize>(block.size()));
+    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
+  }
+  return text;
+}
 
 /// The field `name` of an element of [[kind]], which names it in messages from here on.
 std::string read_name(Fields& in, const std::string& kind);

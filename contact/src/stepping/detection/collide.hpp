@@ -1,7 +1,7 @@
 // Tether: where two shapes are near each other. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/contact/shapes.hpp>
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact::detail {
 
@@ -15,13 +15,6 @@ void collide(const Shape& a, const Pose& pose_a, const Shape& b, const Pose& pos
 
 /// Exchanges the shapes of all points from this one on.
 void turn(NearPoints& out, int from);
-
-/// The points of shape a, no plane and no mesh, against the plane through a point across n.
-void collide_plane(const Shape& a, const Pose& pose_a, const Eigen::Vector3d& on_plane,
-                   const Eigen::Vector3d& n, double margin, NearPoints& out);
-
-/// Farthest point of the shape from its origin (infinite for planes).
-double reach(const Shape& shape);
 
 /// Throws std::invalid_argument unless the shape has the sizes that its kind needs.
 void check(const Shape& shape);

@@ -87,20 +87,20 @@ void along_lines(const ConvexPair& pair, const Flat& s, const Flat& t) {
 }  // namespace
 
 double ConvexPair::height() const {
-  return std::min(margin - apart.gap, kHigh * std::min(a.thickness(), b.thickness()));
+  return std::min(margin - apart.gap, kHigh * std::min(a.thickness, b.thickness));
 }
 
 void ConvexPair::add(const Vector3d& on_a, double core_gap, int feature) const {
   const Vector3d& n = apart.normal;
-  const double gap = core_gap - a.radius() - b.radius();
+  const double gap = core_gap - a.round - b.round;
   if (!(gap < margin)) return;
-  const Vector3d x = origin + on_a - a.radius() * n;
+  const Vector3d x = origin + on_a - a.round * n;
   out.add(x, x - gap * n, n, gap, feature);
 }
 
 void manifold(const ConvexPair& pair, Flat& s, Flat& t) {
   const Vector3d& n = pair.apart.normal;
-  const double thickness = std::min(pair.a.thickness(), pair.b.thickness());
+  const double thickness = std::min(pair.a.thickness, pair.b.thickness);
   const int before = pair.out.count;
   const bool on_s = s.count > 2, on_t = t.count > 2;
   if (s.count > 1 && t.count > 1) {
@@ -119,7 +119,7 @@ void manifold(const ConvexPair& pair, Flat& s, Flat& t) {
   if (s.count != 1 && t.count == 1) x = t.point[0];
   const double low = n.dot(pair.a.farthest(-n));
   x += (low - n.dot(x)) * n;
-  pair.add(x, pair.apart.gap + pair.a.radius() + pair.b.radius(), 0x7f04);
+  pair.add(x, pair.apart.gap + pair.a.round + pair.b.round, 0x7f04);
 }
 
 }  // namespace tether::contact::detail

@@ -81,7 +81,7 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
   pose_.resize(surfaces_.size());
   for (const Surface& s : surfaces_) {
     centred_.push_back(s.shape.kind == ShapeKind::sphere && s.shape.position.isZero(0));
-    size_.push_back(reach(s.shape));
+    size_.push_back(form(s.shape.kind).reach(s.shape));
   }
   reach_.resize(bounded_.size());
   centre_.resize(bounded_.size());
@@ -89,7 +89,7 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
   still_.resize(bounded_.size());
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     const Surface& s = surface(bounded_[k]);
-    reach_[k] = reach(s.shape);
+    reach_[k] = form(s.shape.kind).reach(s.shape);
     still_[k] = !moves(bodies, s.body);
   }
   fixed_ = still_;

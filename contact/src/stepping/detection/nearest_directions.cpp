@@ -217,7 +217,7 @@ Vector3d newton_step(const ConvexShape& a, const ConvexShape& b, const Vector3d&
 // is beside a kink: what is farther from it is tried as well.
 Vector3d improve(const ConvexShape& a, const ConvexShape& b, Vector3d n) {
   double s = separation(a, b, n);
-  const double scale = std::max(a.thickness(), b.thickness());
+  const double scale = std::max(a.thickness, b.thickness);
   Eigen::Matrix<double, 3, 2> T = Eigen::Matrix<double, 3, 2>::Zero();
   const auto snap = [&](double tolerance, double loss) {
     Vector3d held = n;
@@ -260,17 +260,17 @@ Vector3d improve(const ConvexShape& a, const ConvexShape& b, Vector3d n) {
 }  // namespace
 
 double separation(const ConvexShape& a, const ConvexShape& b, const Vector3d& n) {
-  return n.dot(a.farthest(-n) - b.farthest(n)) - a.radius() - b.radius();
+  return n.dot(a.farthest(-n) - b.farthest(n)) - a.round - b.round;
 }
 
 bool find_separation(const ConvexShape& a, const ConvexShape& b, double margin, Separation& out) {
   const Vector3d between = a.centre() - b.centre();
   if (between.squaredNorm() > 0 && separation(a, b, between.normalized()) >= margin) return false;
-  const double thickness = std::min(a.thickness(), b.thickness());
+  const double thickness = std::min(a.thickness, b.thickness);
   double distance = 0;
   for (const double less : kLess) {
     distance = nearest_points(a, b, less, between, out);
-    if (less == 0 && distance - a.radius() - b.radius() >= margin) return false;
+    if (less == 0 && distance - a.round - b.round >= margin) return false;
     if (distance > kApart * thickness) break;
     distance = 0;
   }

@@ -19,23 +19,14 @@
 
 namespace tether::scene::event {
 
-// The points at + shape v, |v| <= 1, with a ball of `radius` around each: an ellipsoid (shape of
-// rank 3), the disc of a cylinder's end (rank 2), a sphere (0). With L the shape in world axes
+// With L the shape of a Round in world axes
 //
 //   s(n) = |L' n| + r |n|      the farthest it reaches along n from its centre
 //   ds/dn                      the point that is that far
 //
 // and L' = W x L, L'' = alpha x L + W x L'.
 
-struct Round {
-  Vector3d at = Vector3d::Zero();
-  Matrix3d shape = Matrix3d::Zero();
-  double radius = 0;
-  Vector3d outward = Vector3d::Zero();  ///< of a disc: a unit vector, out of the body; else zero
-
-  bool is_disc() const { return !outward.isZero(0); }
-  double size() const { return shape.norm() + radius; }
-};
+using scene::Round;
 
 /// Support function of a round body whose frame is known, for unit directions n; `_t`: its
 /// derivative by time with n fixed.

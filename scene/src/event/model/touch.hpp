@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/outline.hpp"
 #include "mechanics/bodies.hpp"
 #include "mechanics/frames.hpp"
 
@@ -82,15 +83,7 @@ inline Touch apart(const Vector3d& d, const Vector3d& d1, const Vector3d& d2, do
 // long as its line goes on over the face: so arcs are longer by kFlush. (A face that turns about
 // the other edge is left by its own border: its corners and other edges touch by then.)
 
-/// A line of a body from `at` over `length` along `along` (a unit vector). Of the edge of a
-/// polyhedron, the directions into its two faces at right angles to it; else they are zero.
-struct Segment {
-  Vector3d at = Vector3d::Zero(), along = Vector3d::UnitX();
-  double length = 0, radius = 0;
-  std::array<Vector3d, 2> inward = {Vector3d::Zero(), Vector3d::Zero()};
-
-  bool is_sharp() const { return !inward[0].isZero(0); }
-};
+using scene::Segment;
 
 struct CrossingFeature {
   Segment first, second;

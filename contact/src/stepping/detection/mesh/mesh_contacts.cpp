@@ -80,7 +80,7 @@ void MeshContacts::collide(const Shape& a, const Pose& A, const Pose& mesh, doub
   const Body body{a, pose, ConvexShape(a, pose, Vector3d::Zero()), margin};
   Vector3d low, high;
   for (int k = 0; k < 3; ++k) {
-    const double round = body.convex.radius() + margin;
+    const double round = body.convex.round + margin;
     high[k] = body.convex.farthest(Vector3d::Unit(k))[k] + round;
     low[k] = body.convex.farthest(-Vector3d::Unit(k))[k] - round;
   }
@@ -110,11 +110,11 @@ void MeshContacts::collide(const Shape& a, const Pose& A, const Pose& mesh, doub
 void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
   const Vector3d &n = near.triangle.normal, &p = near.corner[0];
   if (!(n.dot(p) < 0)) return;  // the middle of the body is behind
-  const double thickness = body.convex.thickness();
-  const double low = n.dot(body.convex.farthest(-n) - p) - body.convex.radius();
+  const double thickness = body.convex.thickness;
+  const double low = n.dot(body.convex.farthest(-n) - p) - body.convex.round;
   if (!(low < body.margin)) return;
   plane_.count = 0;
-  collide_plane(body.shape, body.pose, p, n, body.margin, plane_);
+  form(body.shape.kind).on_plane(body.shape, body.pose, p, n, body.margin, plane_);
   int over = 0;
   bool lowest = false;
   for (int j = 0; j < plane_.count; ++j) {
@@ -144,7 +144,7 @@ void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
 // False: the body is farther than the margin.
 bool MeshContacts::separate(const Body& body, const Near& near, bool& face, NearPoints& out) {
   std::copy(near.corner.begin(), near.corner.end(), corners_.begin());
-  const ConvexShape triangle(corners_, body.convex.thickness());
+  const ConvexShape triangle(corners_, body.convex.thickness);
   Separation apart;
   if (!find_separation(body.convex, triangle, body.margin, apart)) return false;
   if ((apart.normal - near.triangle.normal).norm() < kSame) {
@@ -194,7 +194,7 @@ bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
 // its other cuts are inside the surface that the body lies on.
 void MeshContacts::cut_edges(const Body& body, const Near& near, double low, NearPoints& out) {
   const TriangleMesh::Triangle& t = near.triangle;
-  const double height = std::min(body.margin - low, kHigh * body.convex.thickness());
+  const double height = std::min(body.margin - low, kHigh * body.convex.thickness);
   Flat flat;
   body.convex.flat(-t.normal, height, flat);
   if (flat.count < 2) return;
@@ -208,7 +208,7 @@ void MeshContacts::cut_edges(const Body& body, const Near& near, double low, Nea
     const Cut& c = all.corner[at(j)];
     if (c.edge < 0) continue;
     const double above = t.normal.dot(c.point - near.corner[0]);
-    const double gap = above - body.convex.radius();
+    const double gap = above - body.convex.round;
     if (!(gap < body.margin)) continue;
     const Vector3d foot = c.point - above * t.normal;
     std::uint64_t key = 0;
@@ -217,7 +217,7 @@ void MeshContacts::cut_edges(const Body& body, const Near& near, double low, Nea
       if ((foot - near.corner[at(k)]).norm() <= kLowest * near.longest)
         key = t.sharp_corner[at(k)] != 0 ? key_of(kOnCorner, t.corner[at(k)], 0) : 0;
     if (key != 0)
-      add(c.point - body.convex.radius() * t.normal, t.normal, gap,
+      add(c.point - body.convex.round * t.normal, t.normal, gap,
           key + 0x9e3779b97f4a7c15 * static_cast<std::uint64_t>(t.patch), out);
   }
 }

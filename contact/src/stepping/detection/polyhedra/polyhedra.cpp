@@ -32,7 +32,7 @@ bool meet_as_polyhedra(ShapeKind a, ShapeKind b) {
   if (!is_polyhedron(b)) std::swap(a, b);
   return is_polyhedron(b) &&
          (is_polyhedron(a) || a == ShapeKind::capsule ||
-          (b == ShapeKind::convex && (a == ShapeKind::sphere || a == ShapeKind::points)));
+          (!form(b).has_nearest() && (a == ShapeKind::sphere || a == ShapeKind::points)));
 }
 
 void PolyhedraContacts::collide(const Shape& a, const Polyhedron& of_a, const Pose& A,

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "stepping/detection/polyhedra/face_clipping.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact::detail {
 
-inline bool is_polyhedron(ShapeKind k) { return k == ShapeKind::box || k == ShapeKind::convex; }
+inline bool is_polyhedron(ShapeKind k) { return form(k).family() == ShapeForm::Family::polyhedron; }
 
 /// Boxes and convex hulls against each other, capsules against both, spheres and points against
-/// hulls.
+/// those whose nearest point has no formula.
 bool meet_as_polyhedra(ShapeKind a, ShapeKind b);
 
 /// Their points. Keeps its storage between pairs.

@@ -6,8 +6,9 @@
 #include <cmath>
 #include <map>
 #include <stdexcept>
-#include <tether/linalg/convex_hull.hpp>
 #include <utility>
+
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact::detail {
 
@@ -47,44 +48,13 @@ void finish(Polyhedron& p) {
   }
 }
 
-Polyhedron box(const Vector3d& size) {
-  Polyhedron p;
-  for (int k = 0; k < 8; ++k)
-    p.vertices.push_back(
-        Vector3d((k & 1) != 0 ? 0.5 : -0.5, (k & 2) != 0 ? 0.5 : -0.5, (k & 4) != 0 ? 0.5 : -0.5)
-            .cwiseProduct(size));
-  const int loops[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                           {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-  for (const auto& loop : loops) {
-    Polyhedron::Face face;
-    face.loop.assign(loop, loop + 4);
-    p.faces.push_back(face);
-  }
-  finish(p);
-  return p;
-}
-
-Polyhedron hull(const std::vector<Vector3d>& points) {
-  Polyhedron p;
-  std::map<std::size_t, int> number;  // of the points that are corners
-  for (const std::vector<std::size_t>& corners : linalg::hull_faces(points)) {
-    Polyhedron::Face face;
-    for (const std::size_t k : corners) {
-      const auto [place, fresh] = number.emplace(k, static_cast<int>(p.vertices.size()));
-      if (fresh) p.vertices.push_back(points[k]);
-      face.loop.push_back(place->second);
-    }
-    p.faces.push_back(face);
-  }
-  if (p.faces.empty()) throw std::invalid_argument("convex: the points lie in a plane");
-  finish(p);
-  return p;
-}
-
 }  // namespace
 
 Polyhedron make_polyhedron(const Shape& shape) {
-  return shape.kind == ShapeKind::box ? box(shape.size) : hull(shape.points);
+  Polyhedron p;
+  form(shape.kind).make_polyhedron(shape, p);
+  finish(p);
+  return p;
 }
 
 void place(const Polyhedron& from, const Pose& pose, const Vector3d& origin, Polyhedron& to) {

@@ -1,0 +1,201 @@
+// Tether: meshes and height fields of a scene file. SPDX-License-Identifier: BSD-3-Clause
+#include "read_surface.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "surface_files.hpp"
+
+namespace tether::scene::files {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestFile = std::size_t{64} << 20;
+// Limits for all bodies together: a file may be named by many, and each reads it.
+constexpr std::size_t kMostBytes = 4 * kLargestFile, kMostOfScene = 10 * kMostTriangles;
+
+// A scene from an untrusted source reads nothing but what lies beside it: no way out of its folder,
+// by a link either, and no device.
+bool read_beside(Fields& in, Reader& r, const std::string& name, std::string& text) {
+  std::error_code error;
+  const fs::path folder = fs::path(in.place().file).parent_path();
+  const fs::path base = fs::canonical(folder.empty() ? fs::path(".") : folder, error);
+  const fs::path file = error ? fs::path() : fs::canonical(base / name, error);
+  if (error || !fs::is_regular_file(file, error)) {
+    in.wrong("file", "there is no such file beside the scene");
+    return false;
+  }
+  if (std::mismatch(base.begin(), base.end(), file.begin(), file.end()).first != base.end()) {
+    in.wrong("file", "must lie in the folder of the scene, or below it");
+    return false;
+  }
+  if (r.surface_bytes > kMostBytes) {
+    in.wrong("file", "comes after 256 MiB of surfaces that other bodies of the scene have read");
+    return false;
+  }
+  std::ifstream stream(file, std::ios::binary);
+  text = read_stream(stream, kLargestFile);
+  r.surface_bytes += text.size();
+  r.surface_files.insert(file.string());
+  if (stream.bad() || !stream.eof() || text.size() > kLargestFile) {
+    in.wrong("file", "cannot be read, or is larger than 64 MiB");
+    return false;
+  }
+  return true;
+}
+
+// Lets `parse(name, text)` read the file that is named; false: it is missing or wrong.
+template <class Parse>
+bool from_file(Fields& in, Reader& r, const Parse& parse) {
+  const std::string name = in.input_name("file");
+  std::string text;
+  if (name.empty() || !read_beside(in, r, name, text)) return false;
+  try {
+    parse(fs::path(name).extension().string(), text);
+  } catch (const SurfaceError& e) {
+    in.wrong("file", e.what());
+    return false;
+  }
+  return true;
+}
+
+bool is_number(const Value& v) { return v.kind() == Value::Kind::number && kAny.holds(v.number()); }
+
+std::vector<std::array<int, 3>> read_triangles(Fields& in, std::size_t points) {
+  const Value* value = in.find("triangles");
+  bool right = value->kind() == Value::Kind::array && !value->items().empty() &&
+               value->items().size() <= kMostTriangles;
+  std::vector<std::array<int, 3>> out;
+  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
+    const std::vector<Value>& corners = value->items()[k].items();
+    right = corners.size() == 3;
+    for (const Value& c : corners)
+      right = right && is_number(c) && c.whole() && c.number() >= 0 &&
+              c.number() < static_cast<double>(points);
+    if (right)
+      out.push_back({static_cast<int>(corners[0].number()), static_cast<int>(corners[1].number()),
+                     static_cast<int>(corners[2].number())});
+  }
+  if (right) return out;
+  in.wrong("triangles",
+           fmt::format("must be an array of 1 to {} triangles [i, j, k], numbers of points from 0",
+                       kMostTriangles));
+  return {};
+}
+
+// Rows of equal length, at least two of two.
+Heights read_rows(Fields& in) {
+  const Value* value = in.find("heights");
+  Heights out;
+  bool right = value->kind() == Value::Kind::array && value->items().size() >= 2;
+  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
+    const std::vector<Value>& row = value->items()[k].items();
+    if (k == 0) out.columns = static_cast<int>(row.size());
+    right = row.size() >= 2 && static_cast<int>(row.size()) == out.columns &&
+            out.values.size() + row.size() <= kMostMeshPoints &&
+            std::all_of(row.begin(), row.end(), is_number);
+    if (right)
+      for (const Value& each : row) out.values.push_back(each.number());
+  }
+  if (right) return out;
+  in.wrong("heights",
+           fmt::format("must be an array of rows of numbers, all of one length, at least "
+                       "2 x 2, at most {}, m",
+                       kMostMeshPoints));
+  return {};
+}
+
+// Stands for what is wrong.
+Shape one_triangle() { return Shape::mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}); }
+
+bool in_range(const Shape& shape) {
+  return std::all_of(shape.points.begin(), shape.points.end(), [](const Eigen::Vector3d& p) {
+    return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e100;
+  });
+}
+
+// All that the bodies of a scene have is bounded, too: few lines repeat a body many times.
+bool is_within(Fields& in, Reader& r, const Shape& shape) {
+  r.surface_triangles += shape.triangles.size();
+  if (r.surface_triangles <= kMostOfScene) return true;
+  in.wrong("shape",
+           fmt::format("all surfaces of a scene together have at most {} triangles", kMostOfScene));
+  return false;
+}
+
+bool one_of(Fields& in, const char* inline_key, const char* allowed) {
+  if (in.has("file") == in.has(inline_key)) {
+    if (in.has("file"))
+      in.wrong("file", fmt::format("give file or {}, not both", inline_key));
+    else
+      in.missing(inline_key, allowed);
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void read_mesh(Fields& in, Reader& r, Shape& shape) {
+  shape = one_triangle();
+  in.pass_over({"points", "triangles"});
+  const double scale = in.number("scale", 1, kPositive, "m in one unit of the points");
+  if (!one_of(in, "points", "its corners [[x, y, z], ...], m, and triangles; or a file")) return;
+  Shape read = shape;
+  if (in.has("points")) {
+    if (!in.has("triangles"))
+      return in.missing("triangles", "[[i, j, k], ...], numbers of points from 0");
+    read.points = in.points("points", 3, kMostMeshPoints);
+    if (!read.points.empty()) read.triangles = read_triangles(in, read.points.size());
+    if (read.points.empty() || read.triangles.empty()) return;
+  } else {
+    if (in.has("triangles")) return in.wrong("triangles", "are those of the file");
+    const bool right = from_file(in, r, [&](const std::string& ending, const std::string& text) {
+      if (ending != ".obj" && ending != ".stl")
+        throw SurfaceError("must end in .obj or .stl: no other mesh is read");
+      TriangleSurface surface = ending == ".obj" ? parse_obj(text) : parse_stl(text);
+      read.points = std::move(surface.points);
+      read.triangles = std::move(surface.triangles);
+    });
+    if (!right) return;
+  }
+  if (scale != 1)
+    for (Eigen::Vector3d& p : read.points) p *= scale;
+  if (!in_range(read))
+    return in.wrong(in.has("file") ? "file" : "points", "reaches beyond 1e100 m");
+  if (std::all_of(read.triangles.begin(), read.triangles.end(), [&](const auto& t) {
+        const auto corner = [&](std::size_t k) { return read.points[linalg::at(t[k])]; };
+        const Eigen::Vector3d a = corner(1) - corner(0), b = corner(2) - corner(0);
+        return !(a.cross(b).stableNorm() > 0);
+      }))
+    return in.wrong(in.has("file") ? "file" : "triangles", "none of the triangles has an area");
+  if (is_within(in, r, read)) shape = std::move(read);
+}
+
+void read_height_field(Fields& in, Reader& r, Shape& shape) {
+  shape = one_triangle();
+  in.pass_over({"heights", "file"});
+  const double scale = in.number("scale", 1, kPositive, "m in one unit of the heights");
+  if (!in.has("spacing")) return in.missing("spacing", "[along x, along y], m, > 0");
+  const std::vector<double> spacing = in.numbers("spacing", {2}, "m");
+  if (spacing.empty()) return;
+  if (!(spacing[0] > 0 && spacing[1] > 0)) return in.wrong("spacing", "each must be > 0, m");
+  if (!one_of(in, "heights", "rows [[z, ...], ...] along x, m; or a file")) return;
+  Heights heights;
+  if (in.has("heights")) {
+    heights = read_rows(in);
+  } else {
+    from_file(in, r,
+              [&](const std::string&, const std::string& text) { heights = parse_heights(text); });
+  }
+  if (heights.columns == 0) return;
+  for (double& each : heights.values) each *= scale;
+  Shape read = Shape::height_field(heights.values, heights.columns, spacing[0], spacing[1]);
+  if (!in_range(read)) return in.wrong("spacing", "the field reaches beyond 1e100 m");
+  if (is_within(in, r, read)) shape = std::move(read);
+}
+
+}  // namespace tether::scene::files

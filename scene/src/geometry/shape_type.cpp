@@ -1,0 +1,123 @@
+// Tether: what scenes know of one kind of shape. SPDX-License-Identifier: BSD-3-Clause
+#include "shape_type.hpp"
+
+#include <tether/linalg/convex_hull.hpp>
+
+namespace tether::scene {
+
+using Eigen::Vector3d;
+
+#define SHAPE(kind) const ShapeType& kind##_type();
+#include "shape_type_list.inc"
+#undef SHAPE
+
+#define SHAPE(kind) +1
+static_assert(0
+#include "shape_type_list.inc"
+                  == contact::kShapeKinds.size(),
+              "each kind has a file in the folder shapes");
+#undef SHAPE
+
+namespace {
+
+constexpr std::size_t kMostPoints = 4096;
+
+/// A face between corners that are counter-clockwise from outside.
+Face face_between(const std::vector<Vector3d>& corners) {
+  Face face;
+  Vector3d area = Vector3d::Zero();
+  for (std::size_t k = 1; k + 1 < corners.size(); ++k)
+    area += (corners[k] - corners[0]).cross(corners[k + 1] - corners[0]);
+  face.normal = area.normalized();
+  face.at = corners[0];
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const Vector3d along = corners[(k + 1) % corners.size()] - corners[k];
+    const Vector3d outward = along.cross(face.normal).normalized();
+    face.border.emplace_back(outward, outward.dot(corners[k]));
+  }
+  return face;
+}
+
+void add_polyhedron(const std::vector<Vector3d>& points, Outline& out) {
+  const std::size_t first_knob = out.knobs.size() - points.size();
+  std::map<std::pair<std::size_t, std::size_t>, Segment> edges;
+  for (const std::vector<std::size_t>& face : linalg::hull_faces(points)) {
+    std::vector<Vector3d> corners;
+    for (const std::size_t k : face) corners.push_back(points[k]);
+    out.faces.push_back(face_between(corners));
+    for (std::size_t k = 0; k < face.size(); ++k) {
+      const std::pair<std::size_t, std::size_t> ends =
+          std::minmax(face[k], face[(k + 1) % face.size()]);
+      const bool known = edges.count(ends) > 0;
+      Segment& edge = edges[ends];
+      edge.at = points[ends.first];
+      const Vector3d way = points[ends.second] - points[ends.first];
+      edge.length = way.norm();
+      edge.along = way / edge.length;
+      edge.inward[known ? 1 : 0] = -out.faces.back().border[k].first;
+    }
+  }
+  for (const auto& [ends, edge] : edges) {
+    out.segments.push_back(edge);
+    const Vector3d way = edge.length * edge.along;
+    out.knobs[first_knob + ends.first].edges.push_back(way);
+    out.knobs[first_knob + ends.second].edges.push_back(-way);
+  }
+}
+
+}  // namespace
+
+const ShapeType& type_of(ShapeKind kind) {
+  switch (kind) {
+#define SHAPE(each)     \
+  case ShapeKind::each: \
+    return each##_type();
+#include "shape_type_list.inc"
+#undef SHAPE
+  }
+  throw std::logic_error("a shape of no kind");
+}
+
+void ShapeType::read(files::Fields& in, files::Reader&, Shape& shape) const {
+  for (const ShapeField& field : fields()) {
+    if (field.meaning != nullptr && !in.has(field.key)) in.missing(field.key, field.meaning);
+    if (const auto* number = std::get_if<double Shape::*>(&field.value))
+      shape.** number = in.number(field.key, 1, files::kPositive, field.unit);
+    else if (const auto* points = std::get_if<std::vector<Vector3d> Shape::*>(&field.value))
+      shape.** points = in.points(field.key, field.least, kMostPoints);
+    else if (const auto* vector = std::get_if<Vector3d Shape::*>(&field.value))
+      shape.** vector = field.meaning == nullptr
+                            ? in.direction(field.key, Vector3d::UnitZ())
+                            : in.vector(field.key, Vector3d::Ones(), files::kPositive, field.unit);
+  }
+}
+
+double Outline::reach() const {
+  double far = 0;
+  for (const Knob& each : knobs) far = std::max(far, each.at.norm() + each.radius);
+  for (const Round& each : rounds) far = std::max(far, each.at.norm() + each.size());
+  for (const End& each : ends) far = std::max(far, each.plane.at.norm() + each.radius);
+  for (const Segment& s : segments)
+    far = std::max({far, s.at.norm() + s.radius, (s.at + s.length * s.along).norm() + s.radius});
+  return far;
+}
+
+void add_axis(const Shape& shape, Outline& out) {
+  Segment axis;
+  axis.at = placed(shape, {0, 0, -0.5 * shape.length});
+  axis.along = shape.orientation * Vector3d(0, 0, 1);
+  axis.length = shape.length;
+  axis.radius = shape.radius;
+  out.segments.push_back(axis);
+}
+
+void add_corners(const Shape& shape, const std::vector<Vector3d>& local, bool solid, Outline& out) {
+  std::vector<Vector3d> points;
+  for (const Vector3d& p : local) {
+    points.push_back(placed(shape, p));
+    out.knobs.push_back({points.back(), 0, {}});
+  }
+  if (solid) add_polyhedron(points, out);
+}
+
+}  // namespace tether::scene
