@@ -236,7 +236,7 @@ TEST_CASE("scene: the shipped woodpecker comes down in steps as it does in event
       GENERATE(Case{1e-4, 0, 4e-4}, Case{2e-5, 0, 8e-5}, Case{5e-4, 1e-4, 2e-4});
   Scene scene = read_scene(TETHER_SHIPPED_SCENES "/woodpecker.toml");
   scene.event.reset();
-  scene.engine = EngineChoice::stepping;
+  scene.engine = EngineKind::stepping;
   scene.stepping.emplace();
   scene.stepping->step = step;
   scene.stepping->accuracy = accuracy;

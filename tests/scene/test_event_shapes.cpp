@@ -396,7 +396,7 @@ TEST_CASE("events: meshes are refused by name, and steps take the scene") {
       body("stone", "shape = \"sphere\"\nradius = 0.1", "[1, 1, 3]", "density = 1") + law(0.5, 0);
   Scene scene = parse_scene(text, "curved.toml");
   CHECK(make_plan(scene).engine == EngineKind::stepping);
-  scene.engine = EngineChoice::event;
+  scene.engine = EngineKind::event;
   CHECK_THROWS_WITH(make_plan(scene), Catch::Contains("mesh") && Catch::Contains("[stepping]"));
 }
 

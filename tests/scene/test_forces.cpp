@@ -353,7 +353,7 @@ TEST_CASE("the event engine tells the forces of blocks on a slope, and their sli
   const double c = std::sqrt(0.75), N = 2 * 9.81 * c, pull = 9.81 * (0.5 - 0.3 * c);
   Scene s = parse_scene(kSlope, "slope.toml");
   s.stepping.reset();
-  s.engine = EngineChoice::event;
+  s.engine = EngineKind::event;
   for (const double tolerance : {1e-4, 1e-7, 1e-10}) {
     CAPTURE(tolerance);
     s.event.emplace().tolerance = tolerance;
@@ -387,7 +387,7 @@ TEST_CASE("the event engine tells what pivots pull with, and redundant ones equa
   for (const int pins : {1, 2}) {
     Scene s = pendulum_of(JointKind::hinge, angle, 1, 2, 0.1);
     s.joints.resize(static_cast<std::size_t>(pins), s.joints[0]);
-    s.engine = EngineChoice::event;
+    s.engine = EngineKind::event;
     for (const double tolerance : {1e-6, 1e-9}) {
       s.event.emplace().tolerance = tolerance;
       const auto engine = make_engine(s);

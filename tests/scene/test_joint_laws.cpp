@@ -422,7 +422,7 @@ friction = 0.25
   wrong.smooth.emplace();
   CHECK(refusal(wrong).find("smooth engine does not have") != std::string::npos);
   wrong = s;
-  wrong.engine = EngineChoice::event;
+  wrong.engine = EngineKind::event;
   CHECK(std::string(make_engine(wrong)->name()) == "event");
   wrong = s;
   wrong.stepping.emplace().law = tether::contact::Law::frictionless;

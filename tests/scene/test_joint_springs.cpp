@@ -136,10 +136,10 @@ bool contains(const std::string& text, const char* part) {
 
 std::unique_ptr<Engine> engine_of(Scene scene, EngineKind kind, double tolerance) {
   if (kind == EngineKind::smooth) {
-    scene.engine = EngineChoice::smooth;
+    scene.engine = EngineKind::smooth;
     scene.smooth.emplace().tolerance = tolerance;
   } else {
-    scene.engine = EngineChoice::event;
+    scene.engine = EngineKind::event;
     scene.event.emplace().tolerance = tolerance;
   }
   return make_engine(scene);

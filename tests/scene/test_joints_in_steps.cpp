@@ -271,7 +271,7 @@ TEST_CASE("joints in steps: light links swing with heavy loads as the smooth eng
   steps->advance(end);
   s.stepping.reset();
   s.smooth.emplace().tolerance = 1e-6;
-  s.engine = EngineChoice::smooth;
+  s.engine = EngineKind::smooth;
   const auto smooth = make_engine(s);
   smooth->advance(end);
   INFO(links << " links, " << ratio);

@@ -136,7 +136,7 @@ TEST_CASE("a page is one document with the data of its run, and asks the network
 
 TEST_CASE("the page of an event run has its forces") {
   Scene scene = parse_scene(kBall, "events.toml");
-  scene.engine = EngineChoice::event;
+  scene.engine = EngineKind::event;
   scene.bodies[1].velocity.setZero();
   const std::string page = page_of(scene);
   const std::vector<float> x = floats(decoded(element(page, "film-contacts")));

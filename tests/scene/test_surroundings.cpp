@@ -15,7 +15,7 @@ namespace surroundings {
 Scene surrounded(const std::string& text) { return parse_scene(text, "test"); }
 
 std::unique_ptr<Engine> smooth_or_event(Scene scene, bool events, double tolerance) {
-  scene.engine = events ? EngineChoice::event : EngineChoice::smooth;
+  scene.engine = events ? EngineKind::event : EngineKind::smooth;
   if (events)
     scene.event.emplace().tolerance = tolerance;
   else
@@ -24,7 +24,7 @@ std::unique_ptr<Engine> smooth_or_event(Scene scene, bool events, double toleran
 }
 
 std::unique_ptr<Engine> stepped(Scene scene, double step) {
-  scene.engine = EngineChoice::stepping;
+  scene.engine = EngineKind::stepping;
   scene.stepping.emplace().step = step;
   return make_engine(scene);
 }

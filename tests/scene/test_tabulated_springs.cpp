@@ -60,11 +60,11 @@ double table_error(const Engine& engine) {
                   std::abs(engine.bodies()[1].angular_velocity.z() - spins_at(engine.time())));
 }
 
-std::unique_ptr<Engine> table_engine(Scene scene, EngineChoice engine, double accuracy) {
+std::unique_ptr<Engine> table_engine(Scene scene, EngineKind engine, double accuracy) {
   scene.engine = engine;
-  if (engine == EngineChoice::smooth)
+  if (engine == EngineKind::smooth)
     scene.smooth.emplace().tolerance = accuracy;
-  else if (engine == EngineChoice::event)
+  else if (engine == EngineKind::event)
     scene.event.emplace().tolerance = accuracy;
   else
     scene.stepping.emplace().step = accuracy;
@@ -88,7 +88,7 @@ std::string table_refusal(const std::string& spring, const std::string& joint) {
 using namespace tabulated;
 
 TEST_CASE("tables of stiffness and damping keep their closed forms by tolerance") {
-  for (const EngineChoice engine : {EngineChoice::smooth, EngineChoice::event})
+  for (const EngineKind engine : {EngineKind::smooth, EngineKind::event})
     for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
       const auto run = table_engine(tabled(kCaught), engine, tolerance);
       const double before = run->diagnostics().potential_energy;
@@ -109,7 +109,7 @@ TEST_CASE("tables of stiffness and damping keep their closed forms by tolerance"
 TEST_CASE("tables of stiffness and damping in steps are of order 1, and stable at any step") {
   double last = 0;
   for (const double step : {1e-2, 1e-3, 1e-4}) {
-    const auto run = table_engine(tabled(kCaught), EngineChoice::stepping, step);
+    const auto run = table_engine(tabled(kCaught), EngineKind::stepping, step);
     run->advance(0.5);
     double now = table_error(*run);
     run->advance(0.75);
@@ -124,7 +124,7 @@ TEST_CASE("tables of stiffness and damping in steps are of order 1, and stable a
     for (auto& row : joint.spring->stiffness_table) row[1] *= 1e9;
     for (auto& row : joint.spring->damping_table) row[1] *= 1e9;
   }
-  const auto run = table_engine(stiff, EngineChoice::stepping, 0.1);
+  const auto run = table_engine(stiff, EngineKind::stepping, 0.1);
   for (int k = 1; k <= 20; ++k) {
     run->advance(0.1 * k);
     CHECK(std::abs(run->bodies()[0].position.x()) < 0.2);
@@ -137,7 +137,7 @@ TEST_CASE("energy is kept with the work of tabulated dampers counted") {
   Scene scene = tabled(kCaught);
   scene.invariants.emplace_back();
   scene.invariants.back().kind = InvariantKind::energy;
-  const auto run = table_engine(scene, EngineChoice::smooth, 1e-8);
+  const auto run = table_engine(scene, EngineKind::smooth, 1e-8);
   run->advance(0.75);
   CHECK(table_error(*run) < 1e-6);
 }
@@ -151,7 +151,7 @@ TEST_CASE("a table acts around the rest, on both sides, and turns with an angle"
   for (const auto& [angle, moment] :
        {std::pair{0.0, 0.8}, std::pair{1.2, -2.8}, std::pair{-0.4, 2.8}, std::pair{2.0, -4.0}}) {
     shaft.spring->rest = 0.4 - angle + 2 * M_PI;  // a turn away is the same
-    const auto run = table_engine(scene, EngineChoice::smooth, 1e-8);
+    const auto run = table_engine(scene, EngineKind::smooth, 1e-8);
     CHECK(std::abs(run->forces().joints[1].drive - moment) < 1e-9);
   }
 }

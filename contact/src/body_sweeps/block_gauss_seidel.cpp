@@ -47,88 +47,118 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
 // Sweeps until the island is solved or an assembled problem is forecast to cost less. Sweeps that
 // max_work pays for are made in any case, more while they make progress; max_sweeps end them where
 // they are not cheaper than what would follow.
-void BodySolver::Implementation::iterate(int k, Team& team) {
-  const Island& island = graph.islands[at(k)];
-  const bool again = results[at(k)].assembled;
-  const detail::ContactGraph& whole = team.partners ? partners->whole() : graph;
-  detail::AssemblyPrice price(whole, whole.islands[at(k)], given.first(), given.second());
-  const auto permitted = [&] {
-    return island.contacts <= options.max_assembled && price.within(options.max_work);
-  };
-  IslandResult r = again ? results[at(k)] : start(island, team);
-  const double allowed = options.tolerance / r.inverse_scale;
-  const double bound = std::max(allowed * allowed, r.floor);
-  const double paid = options.max_work / price.sweep();
-  int next_test = island.contacts > kFew ? options.min_sweeps : 0;
-  int failed_tests = 0;
-  double more_before = 0;  // forecast when it was last due
-  detail::Forecast forecast(r.sweeps, r.least_change);
-  detail::Momentum momentum;
-  detail::BestPoint best(options.max_sweeps);
-  r.status = Status::unsolved;
-  r.assembly = 0;
-  if (again) best.want(r.error / r.inverse_scale);
+struct BodySolver::Implementation::Iteration {
+  Iteration(Implementation& of, int k, Team& on)
+      : solver(of),
+        island(of.graph.islands[at(k)]),
+        team(on),
+        price(whole(), whole().islands[at(k)], of.given.first(), of.given.second()),
+        best(of.options.max_sweeps) {
+    const bool again = of.results[at(k)].assembled;
+    r = again ? of.results[at(k)] : of.start(island, team);
+    const double allowed = of.options.tolerance / r.inverse_scale;
+    bound = std::max(allowed * allowed, r.floor);
+    forecast = detail::Forecast(r.sweeps, r.least_change);
+    next_test = island.contacts > kFew ? of.options.min_sweeps : 0;
+    r.status = Status::unsolved;
+    r.assembly = 0;
+    if (again) best.want(r.error / r.inverse_scale);
+  }
+
+  void run() {
+    for (;;) {
+      const PassResult change = solver.sweeps.sweep(island, team);
+      ++r.sweeps;
+      forecast.add(change.sum);
+      if (r.sweeps == detail::BestPoint::kFirst && !permitted()) best.want();
+      const bool due = forecast.due(r.sweeps);
+      r.ended = limited(change.most) || (due && is_in_vain(change.most));
+      if (solves(change.most)) return;
+      if (r.ended) {
+        r.status = forecast.no_progress() ? Status::cycling : Status::work_limit;
+        if (permitted()) r.assembly = solver.options.max_work;
+        return;
+      }
+      if (due && gives_way(change.most)) return;
+      if (momentum.on()) solver.sweeps.extrapolate(island, team, momentum.next(change.sum));
+    }
+  }
+
+  const detail::ContactGraph& whole() const {
+    return team.partners ? solver.partners->whole() : solver.graph;
+  }
+  bool permitted() {
+    return island.contacts <= solver.options.max_assembled && price.within(solver.options.max_work);
+  }
+  bool is_in_vain(double most) {
+    return r.sweeps > solver.options.max_work / price.sweep() &&
+           forecast.in_vain(r.sweeps, most, bound, solver.options.max_sweeps);
+  }
+  // The user's limit, beyond which sweeps go on that cost less than the assembly would.
+  bool limited(double most) {
+    if (r.sweeps < solver.options.max_sweeps) return false;
+    if (r.sweeps <= detail::Forecast::kFirst || !permitted()) return true;
+    return r.sweeps + forecast.more(r.sweeps, most, bound) >
+           solver.options.max_sweeps + price.sweeps();
+  }
+  // The change by a sweep is close to the residual, which would cost another pass.
+  bool solves(double most) {
+    if ((most > bound || r.sweeps < next_test) && island.contacts != 1 && !r.ended) {
+      if (best.is_due(r.sweeps, most) && best.improved(solver.sweeps.test(island, team).most))
+        solver.save(island, team);
+      return false;
+    }
+    double residual = solver.sweeps.test(island, team).most;
+    if (r.stale && (r.ended || residual <= bound)) {
+      solver.sweeps.refresh(island, team);
+      r.stale = false;
+      residual = solver.sweeps.test(island, team).most;
+    }
+    r.saved = r.ended && !best.last_is_best(residual);
+    if (r.saved) residual = best.residual();
+    r.error = r.relative(residual);
+    if (residual <= bound) r.status = Status::solved;
+    next_test = r.sweeps + ++failed_tests;
+    return r.status == Status::solved;
+  }
+  // Whether an assembled problem is to be tried.
+  bool gives_way(double most) {
+    const double more = forecast.more(r.sweeps, most, bound);
+    r.assembly = assembly(std::min(more, more_before));
+    if (r.assembly > 0) return true;
+    more_before = more;
+    if (more > kSlow && r.sweeps > detail::Forecast::kFirst) momentum.start();
+    best.forecast(r.sweeps + more);
+    forecast.made();
+    return false;
+  }
   // Work for an assembled problem where sweeps are forecast to cost more, else 0.
-  const auto assembly = [&](double more) -> double {
+  double assembly(double more) {
     if (!momentum.on() || !permitted()) return 0;
     const double once = price.sweeps(), spent = r.spent / price.sweep();
     const double work = std::max(kRuns * once, kShareOfSweeps * r.sweeps - spent);
     if (r.sweeps < kTried * once || more < kDearer * once || work < spent) return 0;
-    return std::min(options.max_work, work * price.sweep());
-  };
-  // The user's limit, beyond which sweeps go on that cost less than the assembly would.
-  const auto limited = [&](double most) {
-    if (r.sweeps < options.max_sweeps) return false;
-    if (r.sweeps <= detail::Forecast::kFirst || !permitted()) return true;
-    return r.sweeps + forecast.more(r.sweeps, most, bound) > options.max_sweeps + price.sweeps();
-  };
-  for (;;) {
-    const PassResult change = sweeps.sweep(island, team);
-    ++r.sweeps;
-    forecast.add(change.sum);
-    if (r.sweeps == detail::BestPoint::kFirst && !permitted()) best.want();
-    const bool due = forecast.due(r.sweeps);
-    r.ended = limited(change.most) ||
-              (due && r.sweeps > paid &&
-               forecast.in_vain(r.sweeps, change.most, bound, options.max_sweeps));
-    // The change by a sweep is close to the residual, which would cost another pass.
-    if ((change.most <= bound && r.sweeps >= next_test) || island.contacts == 1 || r.ended) {
-      double residual = sweeps.test(island, team).most;
-      if (r.stale && (r.ended || residual <= bound)) {
-        sweeps.refresh(island, team);
-        r.stale = false;
-        residual = sweeps.test(island, team).most;
-      }
-      r.saved = r.ended && !best.last_is_best(residual);
-      if (r.saved) residual = best.residual();
-      r.error = r.relative(residual);
-      if (residual <= bound) {
-        r.status = Status::solved;
-        break;
-      }
-      next_test = r.sweeps + ++failed_tests;
-    } else if (best.is_due(r.sweeps, change.most) &&
-               best.improved(sweeps.test(island, team).most)) {
-      save(island, team);
-    }
-    if (r.ended) {
-      r.status = forecast.no_progress() ? Status::cycling : Status::work_limit;
-      if (permitted()) r.assembly = options.max_work;
-      break;
-    }
-    if (due) {
-      const double more = forecast.more(r.sweeps, change.most, bound);
-      r.assembly = assembly(std::min(more, more_before));
-      if (r.assembly > 0) break;
-      more_before = more;
-      if (more > kSlow && r.sweeps > detail::Forecast::kFirst) momentum.start();
-      best.forecast(r.sweeps + more);
-      forecast.made();
-    }
-    if (momentum.on()) sweeps.extrapolate(island, team, momentum.next(change.sum));
+    return std::min(solver.options.max_work, work * price.sweep());
   }
-  r.least_change = forecast.least();
-  if (team.thread == 0) results[at(k)] = r;
+
+  Implementation& solver;
+  const Island& island;
+  Team& team;
+  detail::AssemblyPrice price;
+  IslandResult r;
+  double bound = 0;
+  int next_test = 0, failed_tests = 0;
+  double more_before = 0;  // forecast when it was last due
+  detail::Forecast forecast{0, 0};
+  detail::Momentum momentum;
+  detail::BestPoint best;
+};
+
+void BodySolver::Implementation::iterate(int k, Team& team) {
+  Iteration each(*this, k, team);
+  each.run();
+  each.r.least_change = each.forecast.least();
+  if (team.thread == 0) results[at(k)] = each.r;
 }
 
 }  // namespace tether::contact

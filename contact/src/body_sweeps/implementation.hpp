@@ -78,6 +78,7 @@ struct BodySolver::Implementation {
   void report();
 
   // block_gauss_seidel.cpp
+  struct Iteration;
   void iterate(int k, Team& team);
   IslandResult start(const Island& island, Team& team);
   void save(const Island& island, Team& team);

@@ -6,6 +6,8 @@
 
 namespace tether::contact::detail {
 
+constexpr double kSlip = 1e-12;  // of what a velocity is the difference of: none
+
 /// Rows of a cone of contact, counted from its first: -1 where it has none.
 struct ConeParts {
   int tangents = 0;             ///< rows 1 .. tangents

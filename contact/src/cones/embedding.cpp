@@ -16,7 +16,6 @@ using linalg::at;
 
 // A diagonal entry of 1 after elimination below which it is held; rounding of its sums is 1e-15.
 constexpr double kHeld = 1e-11;
-constexpr double kSlip = 1e-12;  // of what a velocity is the difference of
 
 double mobility(const ConeProblem& problem, int row) {
   return diagonal_block(problem, row, 1)(0, 0);

@@ -20,7 +20,6 @@ namespace {
 constexpr double kHeld = 1e-14;
 constexpr std::size_t kFew = 20;  // cones whose dense factors cost little beside their solve
 constexpr double kSoft = 1e-5;    // compliance of a support over what moves there without joints
-constexpr double kSlip = 1e-12;   // of the speeds that a slip is the difference of
 
 using linalg::at;
 

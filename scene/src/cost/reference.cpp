@@ -179,7 +179,7 @@ Scene with_setting(const Scene& scene, CostMethod method, double setting) {
     out.smooth->tolerance = setting;
     return out;
   }
-  out.engine = EngineChoice::automatic;
+  out.engine = EngineKind::automatic;
   out.event.reset();
   out.stepping.reset();
   if (method == CostMethod::events) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "output/binary.hpp"
 #include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
@@ -43,8 +44,6 @@ double turn_tolerance(double tolerance, double acceleration) {
 }
 
 constexpr long kMostAtOneTime = 300;
-constexpr double kStartTolerance = 1e-4;
-constexpr long kAnchor = 5000;  // steps
 // Steps that cover less than this part of what is left come to no end: at a microsecond each some
 // thousand years.
 constexpr long kManySteps = 100000;
@@ -241,9 +240,8 @@ bool Driver::Memory::is_sound() const {
     for (int k = 0; k < 3; ++k)
       sound = sound && std::isfinite(each.time[k]) && std::isfinite(each.speed[k]);
   }
-  constexpr long kMostCounted = 1L << 40;
   for (const long count : {at_one_time, events, impacts})
-    sound = sound && count >= 0 && count <= kMostCounted;
+    sound = sound && count >= 0 && count <= binary::kMostCounted;
   return sound;
 }
 

@@ -20,7 +20,6 @@ constexpr binary::Magic kHandedOver = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '3'};
 // have come less far than that before they were given up again.
 constexpr std::int64_t kCalmSteps = 20, kMostCalmSteps = std::int64_t{1} << 40;
 constexpr std::uint64_t kMostHandOvers = 1000;  // then steps go to the end
-constexpr long kMostCounted = 1L << 40;         // in a state: sums of a few of them are numbers
 
 double energy_of(const Engine& engine) {
   const Diagnostics d = engine.diagnostics();
@@ -38,7 +37,7 @@ class EventsThenSteps final : public Engine {
     scene_.event->otherwise = Otherwise::stop;
     steps_scene_ = scene_;
     steps_scene_.event.reset();
-    steps_scene_.engine = EngineChoice::stepping;
+    steps_scene_.engine = EngineKind::stepping;
     try {
       begin_events(event::Begin::at_start);
     } catch (const SimulationError& e) {  // in impacts at the start
@@ -244,7 +243,7 @@ bool EventsThenSteps::are_in_order() const {
   std::optional<double> since = 0;
   for (const HandOver& each : hand_overs_) {
     Counts before = each.before;
-    before.each([&](long n) { good = good && n >= 0 && n <= kMostCounted; });
+    before.each([&](long n) { good = good && n >= 0 && n <= binary::kMostCounted; });
     good = good && since && each.time >= *since && each.back.value_or(each.time) >= each.time;
     since = each.back;
   }

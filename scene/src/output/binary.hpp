@@ -12,6 +12,9 @@
 
 namespace tether::scene::binary {
 
+/// Of counts in a state: sums of a few of them are numbers.
+constexpr long kMostCounted = 1L << 40;
+
 using Magic = char[8];  ///< The first letters of a part of a state.
 
 /// Whether the next letters are these, which are read then.

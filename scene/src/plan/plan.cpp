@@ -2,6 +2,7 @@
 
 #include <ostream>
 #include <tether/scene/run.hpp>
+#include <tether/scene/words.hpp>
 
 #include "effects/list.hpp"
 #include "effects/numbers.hpp"
@@ -23,8 +24,10 @@ std::unique_ptr<Engine> make_engine(const Scene& scene, const Plan& plan) {
     case EngineKind::event:
       return goes_on_in_steps(scene) ? make_event_engine_with_steps(scene)
                                      : make_event_engine(scene);
+    case EngineKind::automatic:
+      break;
   }
-  return nullptr;
+  throw std::invalid_argument("the plan names no engine");
 }
 
 std::unique_ptr<Engine> make_engine(const Scene& scene) {
@@ -88,48 +91,71 @@ std::string smooth_matrices(const Plan& plan) {
          " of joints";
 }
 
-EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
-  std::string refusal;
-  const auto refuse = [&](bool wrong, const std::string& text) {
-    if (wrong) refusal += (refusal.empty() ? "" : "\n") + text;
-  };
-  const auto resolves = [&](double frequency, const char* of) {
+// The engines that a scene asks for, and what it has that not all of them move.
+struct Asked {
+  bool smooth, event, then_steps, stepping, contact, laws, projected;
+
+  explicit Asked(const Scene& s)
+      : smooth(s.engine == EngineKind::smooth || s.smooth),
+        event(s.engine == EngineKind::event || s.event),
+        then_steps(event && goes_on_in_steps(s)),
+        stepping(s.engine == EngineKind::stepping || (s.stepping && !then_steps)),
+        contact(!s.pairs.empty()),
+        laws(effects::has_joint_laws(s)),
+        projected(std::any_of(s.invariants.begin(), s.invariants.end(),
+                              [](const Invariant& each) { return each.project; })) {}
+  bool takes_steps() const { return !event && (stepping || contact || laws); }
+};
+
+/// Lines of what no engine has.
+class Refusals {
+ public:
+  Refusals(const Scene& s, const Asked& asked, const std::string& no_event) {
+    look_at_frequencies(s);
+    look_at_engines(asked);
+    refuse(asked.event && !asked.then_steps && !no_event.empty(), no_event);
     refuse(
-        !effects::is_resolved(frequency, s.end),
-        fmt::format("the frequency of {}, {} Hz, {}", of, frequency, effects::unresolved(s.end)));
-  };
-  for (const Load& load : s.loads)
-    if (load.history) resolves(load.history->frequency, "a load");
-  for (const Joint& joint : s.joints)
-    if (joint.motion) resolves(joint.motion->frequency, "the motion of a joint");
-  const bool contact = !s.pairs.empty();
-  const bool projected = std::any_of(s.invariants.begin(), s.invariants.end(),
-                                     [](const Invariant& each) { return each.project; });
-  const auto asks = [&](EngineChoice which, bool options) { return s.engine == which || options; };
-  const bool smooth = asks(EngineChoice::smooth, s.smooth.has_value());
-  const bool event = asks(EngineChoice::event, s.event.has_value());
-  const bool then_steps = event && goes_on_in_steps(s);
-  const bool stepping = asks(EngineChoice::stepping, s.stepping.has_value() && !then_steps);
-  refuse(
-      smooth + stepping + event > 1,
-      smooth && stepping && !event
-          ? "the scene has options for both engines, [smooth] and [stepping]"
-          : "the scene asks for more than one engine: by engine, [smooth], [stepping] or [event]");
-  refuse(contact && smooth,
-         "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
-  const bool laws = effects::has_joint_laws(s);
-  const std::string has_laws =
-      "the joints of the scene have limits, motors or friction, which the ";
-  refuse(laws && smooth, has_laws + "smooth engine does not have: use [stepping] or [event]");
-  refuse((contact || stepping || laws) && !event && projected,
-         "the stepping engine projects no invariants: give them project = false, or, without "
-         "contacts, use [smooth]");
-  no_event = contact || laws || event ? event_engine_refusal(s) : std::string(kNothingTouches);
-  refuse(event && !then_steps && !no_event.empty(), no_event);
-  refuse(then_steps && projected,
-         "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
-         "project = false");
-  if (!stepping && !then_steps && (event || smooth || !(contact || laws)))
+        asked.then_steps && asked.projected,
+        "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
+        "project = false");
+    if (!asked.stepping && !asked.then_steps &&
+        (asked.event || asked.smooth || !(asked.contact || asked.laws)))
+      look_at_fast_loads(s);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  void refuse(bool wrong, const std::string& line) {
+    if (wrong) text_ += (text_.empty() ? "" : "\n") + line;
+  }
+  void look_at_frequencies(const Scene& s) {
+    const auto resolves = [&](double frequency, const char* of) {
+      refuse(
+          !effects::is_resolved(frequency, s.end),
+          fmt::format("the frequency of {}, {} Hz, {}", of, frequency, effects::unresolved(s.end)));
+    };
+    for (const Load& load : s.loads)
+      if (load.history) resolves(load.history->frequency, "a load");
+    for (const Joint& joint : s.joints)
+      if (joint.motion) resolves(joint.motion->frequency, "the motion of a joint");
+  }
+  void look_at_engines(const Asked& a) {
+    refuse(a.smooth + a.stepping + a.event > 1,
+           a.smooth && a.stepping && !a.event
+               ? "the scene has options for both engines, [smooth] and [stepping]"
+               : "the scene asks for more than one engine: by engine, [smooth], [stepping] or "
+                 "[event]");
+    refuse(a.contact && a.smooth,
+           "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
+    refuse(a.laws && a.smooth,
+           "the joints of the scene have limits, motors or friction, which the smooth engine does "
+           "not have: use [stepping] or [event]");
+    refuse(a.takes_steps() && a.projected,
+           "the stepping engine projects no invariants: give them project = false, or, without "
+           "contacts, use [smooth]");
+  }
+  // Engines whose steps resolve a load.
+  void look_at_fast_loads(const Scene& s) {
     for (const Load& load : s.loads) {
       if (!effects::pushes(load)) continue;
       const double steps = effects::kStepsOfPeriod * load.history->frequency * s.end;
@@ -138,30 +164,36 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
                          "and event, {:g} at most are taken: use [stepping], which takes means",
                          load.history->frequency, steps, kMostSteps));
     }
-  if (!refusal.empty()) throw std::invalid_argument(refusal);
+  }
 
-  if (then_steps && !no_event.empty()) {
+  std::string text_;
+};
+
+EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
+  const Asked asked(s);
+  no_event = asked.contact || asked.laws || asked.event ? event_engine_refusal(s)
+                                                        : std::string(kNothingTouches);
+  const Refusals refusals(s, asked, no_event);
+  if (!refusals.text().empty()) throw std::invalid_argument(refusals.text());
+  if (asked.then_steps && !no_event.empty()) {
     why = "[event] otherwise: " + no_event;
     return EngineKind::stepping;
   }
-  if (event) {
-    why = contact ? "bodies touch, and the scene asks for it"
-          : laws  ? "joints have limits, motors or friction, and the scene asks for it"
-                  : "the scene asks for it";
+  if (asked.event) {
+    why = asked.contact ? "bodies touch, and the scene asks for it"
+          : asked.laws  ? "joints have limits, motors or friction, and the scene asks for it"
+                        : "the scene asks for it";
     return EngineKind::event;
   }
-  if (contact) {
+  if (asked.contact)
     why = s.joints.empty() ? "bodies touch" : "bodies touch; it has joints, too";
-    return EngineKind::stepping;
-  }
-  if (laws && !stepping) {
+  else if (asked.laws && !asked.stepping)
     why = "joints have limits, motors or friction";
-    return EngineKind::stepping;
-  }
-  why = stepping ? "the scene asks for it"
-        : smooth ? "nothing touches, and the scene asks for it"
-                 : "nothing touches";
-  return stepping ? EngineKind::stepping : EngineKind::smooth;
+  else
+    why = asked.stepping ? "the scene asks for it"
+          : asked.smooth ? "nothing touches, and the scene asks for it"
+                         : "nothing touches";
+  return asked.takes_steps() ? EngineKind::stepping : EngineKind::smooth;
 }
 
 // How steps are taken, after why there are any.
@@ -224,11 +256,7 @@ Plan make_plan(const Scene& scene) {
 std::ostream& operator<<(std::ostream& out, const Plan& plan) {
   const bool smooth = plan.engine == EngineKind::smooth;
   const bool event = plan.engine == EngineKind::event;
-  out << fmt::format("engine    {} ({})\n",
-                     smooth  ? "smooth"
-                     : event ? "event"
-                             : "stepping",
-                     plan.why);
+  out << fmt::format("engine    {} ({})\n", word(plan.engine), plan.why);
   out << others(plan);
   out << fmt::format("bodies    {}, {} of them moving; {}\n", plan.bodies, plan.moving,
                      counted(plan.shapes, "shape"));

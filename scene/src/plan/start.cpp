@@ -19,7 +19,7 @@ double size_of(const Body& body) {
 /// Bodies and how they meet, without what moves them.
 Scene only_contacts(const Scene& scene) {
   Scene out;
-  out.engine = EngineChoice::stepping;
+  out.engine = EngineKind::stepping;
   out.bodies = scene.bodies;
   out.pairs = scene.pairs;
   for (Body& body : out.bodies) {

@@ -2,6 +2,7 @@
 
 #include <ctime>
 #include <sstream>
+#include <tether/scene/words.hpp>
 
 #include "judge.hpp"
 #include "output/binary.hpp"
@@ -56,7 +57,7 @@ std::unique_ptr<Engine> engine_of(const Scene& scene, const Plan& plan, contact:
   throw std::invalid_argument(fmt::format(
       "several processes share steps with impulses; this scene is moved by the engine \"{}\", in "
       "one process ({})",
-      plan.engine == EngineKind::smooth ? "smooth" : "event", plan.why));
+      word(plan.engine), plan.why));
 }
 
 /// One run from its start, or from a saved state, to the end.

@@ -71,7 +71,7 @@ std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan) {
   moving.end = 1;
   moving.output = Output{};
   moving.expect.clear();
-  moving.engine = EngineChoice::automatic;
+  moving.engine = EngineKind::automatic;
   if (plan.engine == EngineKind::event) {
     if (!moving.event) moving.event.emplace();
     moving.event->max_steps = EventOptions{}.max_steps;

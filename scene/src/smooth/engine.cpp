@@ -15,9 +15,6 @@ using namespace smooth;
 
 constexpr binary::Magic kMagic = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
 
-// Figures of a file are rounded, so a start may be off the joints by this much, relative to the
-// scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
-constexpr double kStartTolerance = 1e-4;
 // Errors that may be left then; velocities may have more, since weak rows near a singular position
 // leave it.
 constexpr double kLeft = 1e-7, kSpeedLeft = 1e-5;

@@ -20,17 +20,14 @@ double local_tolerance(const SmoothOptions& options) {
   return std::max({tighter * wanted, std::min(wanted, rounding), smallest});
 }
 
-// Newton's test, of the local tolerance: IDA's 0.33 leaves noise that singular positions and the
-// multipliers of index 2 magnify.
-constexpr double kNewton = 0.1, kNewtonIndex2 = 0.02;
+// The multipliers of index 2 magnify what Newton's test leaves.
+constexpr double kNewtonIndex2 = 0.02;
 constexpr double kNewtonRounding = 2e-13;  // no less of it
 
 // Noise of velocities across the joints, times pivot^2; see weights().
 constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1e-3;
 
-// Steps from one anchor to the next, see SmoothEngine; not close to a singular position, where y'
-// and the multipliers are badly known.
-constexpr long kAnchor = 5000;
+// An anchor is not close to a singular position, where y' and the multipliers are badly known.
 constexpr double kAnchorPivot = 0.01;
 
 double now() {

@@ -10,6 +10,14 @@
 
 namespace tether::scene {
 
+/// Figures of a file are rounded, so a start may be off the joints by this much, relative to the
+/// scene's size and speed (at least 1 m, 1 m/s). It is moved onto them.
+constexpr double kStartTolerance = 1e-4;
+/// Newton's test, of the local tolerance: IDA's 0.33 leaves noise that singular positions magnify.
+constexpr double kNewton = 0.1;
+/// Steps from one anchor to the next, from which a saved state is arrived at again.
+constexpr long kAnchor = 5000;
+
 template <auto release>
 struct Released {
   template <class Object>

@@ -17,7 +17,6 @@ namespace {
 
 constexpr double kParallelLines = 0.05;  // sine: lines that touch along each other
 
-constexpr double kHigh = 0.1;  // of the thickness: what may lie against a surface
 constexpr double kLow = 1e-6;  // above the lowest point
 
 // Clips a line or a face to another face, seen along n; cuts have the identities of the edge and of

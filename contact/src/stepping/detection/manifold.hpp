@@ -9,6 +9,8 @@
 
 namespace tether::contact::detail {
 
+constexpr double kHigh = 0.1;  // of the thickness: what may lie against a surface
+
 /// Both shapes of a pair about a common origin, and where their points go.
 struct ConvexPair {
   const ConvexShape &a, &b;

@@ -13,9 +13,6 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
-/// The engines.
-enum class EngineKind : std::uint8_t { smooth, stepping, event };
-
 /// An effect that the scene names.
 struct Effect {
   std::string name;    ///< e.g. "gravity"

@@ -161,7 +161,7 @@ struct EventOptions {
 };
 
 /// The engine that a scene asks for; `automatic` leaves it to the plan.
-enum class EngineChoice : std::uint8_t { automatic, smooth, stepping, event };
+enum class EngineKind : std::uint8_t { automatic, smooth, stepping, event };
 
 /// Files that a run writes.
 struct Output {
@@ -274,7 +274,7 @@ struct Scene {
   std::vector<Load> loads;                        ///< on bodies
   std::vector<CentralGravity> central_gravity;    ///< on all bodies
   std::vector<Invariant> invariants;              ///< kept or recorded, in smooth scenes
-  EngineChoice engine = EngineChoice::automatic;  ///< that the file asks for
+  EngineKind engine = EngineKind::automatic;  ///< that the file asks for
   /// Holds for both engines with contacts.
   contact::SimultaneousImpacts simultaneous_impacts = contact::SimultaneousImpacts::together;
   // At most one of the three is given, but steps may be what events go on with

@@ -76,12 +76,12 @@ struct Words<Formulation> {
 };
 
 template <>
-struct Words<EngineChoice> {
-  static constexpr std::array<std::pair<std::string_view, EngineChoice>, 4> list{{
-      {"automatic", EngineChoice::automatic},
-      {"smooth", EngineChoice::smooth},
-      {"stepping", EngineChoice::stepping},
-      {"event", EngineChoice::event},
+struct Words<EngineKind> {
+  static constexpr std::array<std::pair<std::string_view, EngineKind>, 4> list{{
+      {"automatic", EngineKind::automatic},
+      {"smooth", EngineKind::smooth},
+      {"stepping", EngineKind::stepping},
+      {"event", EngineKind::event},
   }};
 };
 

@@ -14,7 +14,6 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kFirstAtMost = 0.1;
-constexpr double kNewton = 0.1;  // Newton's test, of the tolerance
 constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
 constexpr double kTurned = 0.5;  // of a slip, since Newton's matrix was made
 constexpr double kMoved = 1e-5;  // of the state, since d(y')/dy was found

@@ -66,7 +66,7 @@ void overlay(const RunArguments& arguments, Scene& scene) {
       if (std::string& file = o[each->name]; !file.empty() && file != "-")
         file = (std::filesystem::path(arguments.folder) / file).string();
   if (arguments.otherwise) {
-    if (scene.engine != EngineChoice::event && !scene.event)
+    if (scene.engine != EngineKind::event && !scene.event)
       throw std::invalid_argument(
           "--otherwise is for scenes of the event engine: engine = \"event\", or [event]");
     if (!scene.event) scene.event.emplace();
@@ -84,6 +84,22 @@ void write_film_alone(Output& o, std::string& html) {
   for (const formats::Format* each : formats::all())
     if (!each->film) o[each->name].clear();
   html.clear();
+}
+
+/// `shared`: a line behind the summary, or nothing.
+void report(const Scene& scene, const RunResult& result, const std::string& shared,
+            double seconds) {
+  print_summary(scene, result);
+  fmt::print("{}", shared);
+  print_times(result, seconds);
+  print_judgements(scene, result);
+  print_files(result);
+  if (result.interrupted)
+    fmt::print("interrupted at {:.9g} s of {:g} s{}\n", result.time, scene.end,
+               scene.output["state"].empty()
+                   ? ""
+                   : fmt::format("; to go on: --restart {}", scene.output["state"]));
+  std::fflush(stdout);
 }
 
 /// ranks: processes that make the same run, null: there is one.
@@ -133,20 +149,12 @@ int run_scene(const RunArguments& arguments, Ranks* ranks) {
   if (!first) return code;
   bar.hide();
   standard_output.copy();
-  print_summary(scene, result);
+  std::string shared;
   if (ranks)
-    fmt::print("  ranks        {} processes, which shared {} contact problems\n",
-               ranks->messages().size(), team->problems());
-  print_times(result,
-              std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-  print_judgements(scene, result);
-  print_files(result);
-  if (result.interrupted)
-    fmt::print("interrupted at {:.9g} s of {:g} s{}\n", result.time, scene.end,
-               scene.output["state"].empty()
-                   ? ""
-                   : fmt::format("; to go on: --restart {}", scene.output["state"]));
-  std::fflush(stdout);
+    shared = fmt::format("  ranks        {} processes, which shared {} contact problems\n",
+                         ranks->messages().size(), team->problems());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  report(scene, result, shared, took.count());
   return code;
 }
 

@@ -19,7 +19,6 @@ constexpr double kBorder = 1e-10;  // of the longest edge: what is on the border
 constexpr double kShallow = 1e-6;  // of the thickness: depths at which a face needs no proof
 constexpr double kLowest = 1e-9;   // of the thickness: heights that are the same
 constexpr double kSame = 1e-6;     // radian: directions that are the same
-constexpr double kHigh = 0.1;      // of the thickness: what may lie against a face
 constexpr std::size_t kMost = 48;  // corners of what is cut
 
 // Identity of a point by its features; the same from step to step.
