@@ -38,7 +38,7 @@ make_list() {
     echo 'function(target_include_directories)'
     echo 'endfunction()'
     sed -n '/^function(tether_list/,/^endfunction/p' "$source/cmake/TetherTarget.cmake"
-    echo "include($1/CMakeLists.txt)"
+    sed "s/ CONFIGURE_DEPENDS//; s,\${CMAKE_CURRENT_LIST_DIR},$PWD/$1,g" "$1/CMakeLists.txt"
   } >"$work/list.cmake"
   "$cmake" -P "$work/list.cmake"
 }
@@ -52,10 +52,15 @@ compile() {
   nm -C "$work/one.o" | grep -q " [^U] .*$1" || fail "$2 has no $1"
 }
 
+changes() {
+  diff -rq "$source/scene" scene || true
+  diff -rq "$source/contact" contact || true
+}
+
 # touches <number> <kind>
 touches() {
-  count=$({ diff -rq "$source/scene" scene; diff -rq "$source/contact" contact; } | grep -c .) || true
-  [ "$count" -eq "$1" ] || fail "a new $2 touches $count files: $({ diff -rq "$source/scene" scene; diff -rq "$source/contact" contact; } || true)"
+  count=$(changes | grep -c .) || true
+  [ "$count" -eq "$1" ] || fail "a new $2 touches $count files: $(changes)"
   grep -q "^| $2 |.*| $1 |$" "$source/CONTRIBUTING.md" || fail "CONTRIBUTING.md does not say that a new $2 touches $1 files"
 }
 

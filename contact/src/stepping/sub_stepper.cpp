@@ -37,7 +37,8 @@ std::vector<double> body_sizes(const BodySet& bodies, const std::vector<Surface>
   for (const Surface& each : surfaces) {
     const auto i = at(each.body);
     if (i < out.size() && each.shape.kind != ShapeKind::plane)
-      out[i] = std::max(out[i], each.shape.position.norm() + form(each.shape.kind).reach(each.shape));
+      out[i] =
+          std::max(out[i], each.shape.position.norm() + form(each.shape.kind).reach(each.shape));
   }
   for (std::size_t i = 0; i < out.size(); ++i)
     if (out[i] == 0 && bodies.mass[i] > 0)

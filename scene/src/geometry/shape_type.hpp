@@ -51,7 +51,7 @@ const ShapeType& type_of(ShapeKind kind);
 
 /// A sphere, an ellipsoid or a capsule, whose half spheres are `length` apart along z.
 Mesh capsule_mesh(double radius, double length, int around);
-/// Of a solid with the mean squares of its coordinates, as parts of `lengths` squared.
+/// A solid in which the mean square of a coordinate is a part of that length squared: 1 / part.
 MassProperties along_axes(double volume, const Eigen::Vector3d& lengths, double part);
 /// Faces of the hull of points, or these one by one.
 Mesh points_mesh(const std::vector<Eigen::Vector3d>& points);

@@ -12,7 +12,7 @@
 
 namespace tether::scene::binary {
 
-/// Of counts in a state: sums of a few of them are numbers.
+/// The largest count in a state; sums of a few are numbers.
 constexpr long kMostCounted = 1L << 40;
 
 using Magic = char[8];  ///< The first letters of a part of a state.

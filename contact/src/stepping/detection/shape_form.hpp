@@ -23,7 +23,7 @@ class ShapeForm {
   /// Decides by which algorithm two shapes meet.
   enum class Family : std::uint8_t { ball, polyhedron, curved, points, plane, mesh };
 
-  /// Of two shapes the one of lower rank comes first where their points are found.
+  /// The shape of lower rank comes first where the points of two are found.
   ShapeForm(Family family, int rank) : family_(family), rank_(rank) {}
   virtual ~ShapeForm() = default;
   Family family() const { return family_; }

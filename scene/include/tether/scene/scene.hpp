@@ -268,13 +268,13 @@ struct Scene {
   std::vector<Body> bodies;                ///< index i everywhere is body i
   std::vector<Pair> pairs;                 ///< none: bodies do not touch
   // Lists of what acts; empty: nothing of the kind.
-  std::vector<Joint> joints;                      ///< index i everywhere is joint i
-  std::vector<Coupling> couplings;                ///< between joints
-  std::vector<Spring> springs;                    ///< index i everywhere is spring i
-  std::vector<Load> loads;                        ///< on bodies
-  std::vector<CentralGravity> central_gravity;    ///< on all bodies
-  std::vector<Invariant> invariants;              ///< kept or recorded, in smooth scenes
-  EngineKind engine = EngineKind::automatic;  ///< that the file asks for
+  std::vector<Joint> joints;                    ///< index i everywhere is joint i
+  std::vector<Coupling> couplings;              ///< between joints
+  std::vector<Spring> springs;                  ///< index i everywhere is spring i
+  std::vector<Load> loads;                      ///< on bodies
+  std::vector<CentralGravity> central_gravity;  ///< on all bodies
+  std::vector<Invariant> invariants;            ///< kept or recorded, in smooth scenes
+  EngineKind engine = EngineKind::automatic;    ///< that the file asks for
   /// Holds for both engines with contacts.
   contact::SimultaneousImpacts simultaneous_impacts = contact::SimultaneousImpacts::together;
   // At most one of the three is given, but steps may be what events go on with
