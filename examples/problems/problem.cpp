@@ -40,7 +40,8 @@ double Problem::error(const double* y) const {
     if (!std::isfinite(relative)) return std::numeric_limits<double>::quiet_NaN();
     worst = std::max(worst, relative);
   }
-  return compared > 0 ? worst : std::numeric_limits<double>::quiet_NaN();
+  const bool known = compared > 0 || error_components == 0;
+  return known ? worst : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace tether::problems

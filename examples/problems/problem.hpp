@@ -61,7 +61,7 @@ struct Problem {
   ida_projection::Constraints recommended_constraints() const;
 
   /// max |y_i - reference_i| / (1 + |reference_i|) over the compared components; NaN if
-  /// there are none or y is not finite.
+  /// none of them is known or y is not finite.
   double error(const double* y) const;
 };
 

@@ -7,6 +7,10 @@
 // independent errors of size r it contains r sqrt(C(2k+2, k+1)), and the test multiplies it by
 // about 1/(k+1). The tolerance grows by a multiple of that. Where y_a does not answer to the move
 // it stays as it is, however far the step leads.
+//
+// Where F jumps in time, as under a force that is switched, y_a jumps with it. Steps that reach
+// beyond fail the test however short they are, and those that do not are accepted, without end. The
+// test is left out then until steps are as long again as the first one that was refused.
 #include "step/algebraic_test.hpp"
 
 #include <algorithm>
@@ -23,6 +27,8 @@ namespace {
 constexpr double kOfNoise = 1e3;
 constexpr double kMemory = 0.9;  // per step: S changes slowly
 constexpr double kStays = 0.5;   // of the error; a shorter step lowers it as h, to 1/16 at least
+// So much shorter a step that y_a did not follow: fronts of titrations are 1e4 times wider.
+constexpr double kAtOnce = 1e-6;
 
 double noise_in_test(int order) {
   double binomial = 1.0;
@@ -36,6 +42,22 @@ void AlgebraicTest::begin(const std::vector<int>& variables) {
   variables_.clear();
   for (const int j : variables) variables_.push_back({j, 0.0, 0.0});
   steps_ = -1;
+  refused_h_ = 0.0;
+  jump_ = false;
+}
+
+// An attempt at the same step: the last one was refused.
+void AlgebraicTest::look_for_jump(double h, long steps) {
+  if (steps != steps_) {
+    if (h_ < refused_h_) return;
+    refused_h_ = 0.0;
+    jump_ = false;
+  } else if (refused_h_ == 0.0) {
+    refused_h_ = h_;
+    refused_error_ = error_;
+  } else {
+    jump_ = jump_ || (h < kAtOnce * refused_h_ && error_ > kStays * refused_error_);
+  }
 }
 
 // Rounding makes independent errors, too.
@@ -44,7 +66,9 @@ double AlgebraicTest::widened(const Variable& v, double weight, double y) const 
   return weight / (1.0 + weight * noise_ * error);
 }
 
-void AlgebraicTest::look(const Candidate& candidate, double move, int order, long steps) {
+void AlgebraicTest::look(const Candidate& candidate, double move, int order, double h, long steps) {
+  look_for_jump(h, steps);
+  h_ = h;
   if (steps != steps_)
     for (Variable& v : variables_) v.response *= kMemory;
   order_ = order;
@@ -73,7 +97,7 @@ void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
     if (response != nullptr && move_ > 0.0)
       v.response = std::max(v.response, std::abs(response[v.index]) / move_);
     v.weight = weights[v.index];
-    weights[v.index] = widened(v, v.weight, candidate.base_entries[v.index]);
+    weights[v.index] = jump_ ? 0.0 : widened(v, v.weight, candidate.base_entries[v.index]);
   }
 }
 

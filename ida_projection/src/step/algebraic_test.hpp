@@ -14,8 +14,9 @@ class AlgebraicTest {
  public:
   void begin(const std::vector<int>& variables);
   bool acts() const { return !variables_.empty(); }
-  /// A new attempt, `steps` accepted before it: its order, and the length of its move.
-  void look(const Candidate& candidate, double move, int order, long steps);
+  /// A new attempt, `steps` accepted before it: its order and step size, and the length of its
+  /// move.
+  void look(const Candidate& candidate, double move, int order, double h, long steps);
   /// Do these variables keep IDA from a step of twice the size?
   bool limit_step() const;
   /// In the first step: has their error stayed where it was, though IDA has shortened the step?
@@ -32,6 +33,7 @@ class AlgebraicTest {
     double response;  // to a move by one tolerance, largest of the latest steps
   };
   double widened(const Variable& v, double weight, double y) const;
+  void look_for_jump(double h, long steps);
 
   std::vector<Variable> variables_;
   // The last attempt:
@@ -39,6 +41,10 @@ class AlgebraicTest {
   int order_ = 1;
   double move_ = 0.0, noise_ = 0.0;
   double error_ = 0.0, first_error_ = 0.0;  // as IDA's test sees them; of the first attempt
+  double h_ = 0.0;
+  // The longest refused step since steps were as long, and its error; 0: none was.
+  double refused_h_ = 0.0, refused_error_ = 0.0;
+  bool jump_ = false;  // it stays in steps that are far shorter
 };
 
 }  // namespace tether::ida_projection

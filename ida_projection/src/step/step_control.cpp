@@ -41,7 +41,7 @@ void StepControl::restore_weights(N_Vector weights, long last_steps) {
 
 void StepControl::widen_test(const Candidate& candidate, Polish& polish, double move, long steps) {
   if (!algebraic_test_.acts() || !std::isfinite(move)) return;
-  algebraic_test_.look(candidate, move, ida_.order(), steps);
+  algebraic_test_.look(candidate, move, ida_.order(), std::abs(ida_.step_size()), steps);
   const bool asks = polish.iterations() > 0 && algebraic_test_.limit_step();
   algebraic_test_.widen(candidate, asks ? polish.response(ida_.step()) : nullptr);
 }
