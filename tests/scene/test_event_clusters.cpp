@@ -298,7 +298,7 @@ TEST_CASE("event: corners that contradict each other by an error of the state ho
   const Eigen::MatrixXd A = J * inverse.asDiagonal() * J.transpose();
   Eigen::VectorXd b = -J * u;
   for (int i = 0; i < 12; ++i) b[i] += 1e-10 * std::sin(3.0 * i);
-  const event::FrictionAnswer answer = event::solve_impact(
+  const event::FrictionSolution answer = event::solve_impact(
       event::FrictionProblem::of_contacts(A, b, Eigen::VectorXd::Constant(4, 0.5)), 1e-8);
   REQUIRE(answer.solved);
   for (int k = 0; k < 4; ++k)
@@ -308,7 +308,7 @@ TEST_CASE("event: corners that contradict each other by an error of the state ho
   // Two of the four carry more, by the moment of the friction: each side the same.
   CHECK(std::abs(answer.x[0] - answer.x[3] - answer.x[6] + answer.x[9]) < 1e-8);
   // Across the cone they slide, all in one direction, none of them lifted by another's choice.
-  const event::FrictionAnswer slides = event::solve_impact(
+  const event::FrictionSolution slides = event::solve_impact(
       event::FrictionProblem::of_contacts(A, b, Eigen::VectorXd::Constant(4, 0.1)), 1e-8);
   REQUIRE(slides.solved);
   for (int k = 0; k < 4; ++k) {
@@ -327,7 +327,7 @@ TEST_CASE("event: a contact that the joints lock carries nothing") {
   for (const double left : {0.0, 1e-16}) {
     CAPTURE(left);
     A.bottomRightCorner(3, 3) = left * Eigen::Matrix3d::Identity();
-    const event::FrictionAnswer answer =
+    const event::FrictionSolution answer =
         event::solve_friction(event::FrictionProblem::of_contacts(A, b, mu));
     REQUIRE(answer.solved);
     CHECK((answer.x.head(3) - b.head(3)).norm() < 1e-14);

@@ -14,8 +14,8 @@ namespace woodpecker {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using tether::scene::event::ContactKinematics;
 using tether::scene::event::ContactLaw;
-using tether::scene::event::ContactLook;
 
 class Woodpecker : public tether::scene::event::Model {
  public:
@@ -61,7 +61,7 @@ class Woodpecker : public tether::scene::event::Model {
            : contact == 1 ? rM - r0 + hM * q_[1]
                           : rM - r0 - hM * q_[1];
   }
-  void look(int contact, ContactLook& out) override {
+  void evaluate_contact(int contact, ContactKinematics& out) override {
     double rate = 0;
     out.gap = gap(contact, rate);
     out.normal.setZero(3);

@@ -196,17 +196,18 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
     if (counts_.steps + phase_->counts().steps > options_.max_steps)
       fail(fmt::format("max_steps = {} steps are taken", options_.max_steps));
     check_pace(t);
-    next_ = watcher_.look(*phase_);
-    if (take_again()) continue;
+    next_ = watcher_.first_zero(*phase_);
+    if (repeat_phase()) continue;
     if (next_) continue;
     turn_slips();
     rows_are_weak_ = phase_->has_weak_rows();
   }
 }
 
-// A gap that is zero where it hardly moves: the phase from its start, at the tolerance that tells.
-bool Driver::take_again() {
-  double tolerance = std::max(watcher_.telling_tolerance(), kLeastInFlight);
+// Repeats the phase from its start where a gap is zero with hardly any speed, at the tolerance that
+// decides whether it is an impact. Returns whether it does.
+bool Driver::repeat_phase() {
+  double tolerance = std::max(watcher_.deciding_tolerance(), kLeastInFlight);
   if (next_ && next_->what == Watch::gap && !next_->was_near) {
     double rate = 0;
     model_.set(phase_->start() + next_->time, next_->y.data(),
@@ -245,7 +246,7 @@ bool Driver::Memory::is_sound() const {
   return sound;
 }
 
-// Since the last event.
+// Fails if the steps since the last event are too short for the time that is left.
 void Driver::check_pace(double t) const {
   const long steps = paced_.steps + phase_->counts().steps;
   const double way = paced_.way + phase_->step_end();
@@ -522,7 +523,7 @@ double Driver::longest_first_step(const std::vector<bool>& leaving) {
   const VectorXd a = motion_.acceleration();
   const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
   double longest = 0;
-  ContactLook look;
+  ContactKinematics kinematics;
   for (int i = 0; i < model_.contacts(); ++i) {
     if (motion_.modes()[at(i)].mode != Mode::open) continue;
     if (model_.is_apart(i, bands().gap(i))) continue;
@@ -531,8 +532,9 @@ double Driver::longest_first_step(const std::vector<bool>& leaving) {
     if (leaving[at(i)]) model_.gap(i, speed);
     const bool closing = gap > 0 && gap <= bands().gap(i) && speed < -bands().approach(i);
     if (!leaving[at(i)] && !closing) continue;
-    model_.look(i, look);
-    const double flight = flight_time(gap, speed, -(look.normal.dot(a) + look.normal_rest));
+    model_.evaluate_contact(i, kinematics);
+    const double flight =
+        flight_time(gap, speed, -(kinematics.normal.dot(a) + kinematics.normal_rest));
     if (!(flight > 0)) continue;
     const double first = std::max(part * flight, kLeastWay / std::abs(speed));
     longest = longest > 0 ? std::min(longest, first) : first;

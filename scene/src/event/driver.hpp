@@ -89,7 +89,7 @@ class Driver {
   std::string contradiction() const;
   void settle_velocities();
   void start_phase(double most = 1);  // tolerance of IDA
-  bool take_again();
+  bool repeat_phase();
   void handle(const Zero& zero);
   void anchor();
   void check_pace(double t) const;
@@ -101,8 +101,8 @@ class Driver {
   void refuse_blocked(const ContactRows& rows, const Impact& impact);
   Impact expect(const ContactRows& rows, const VectorXd& before, bool plastic);
   double change_velocities(const VectorXd& change);
-  void tell_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
-                    const VectorXd& after, const VectorXd& x, double lost);
+  void record_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
+                      const VectorXd& after, const VectorXd& x, double lost);
   bool has_accumulated(int contact, double approach, double& rest) const;
   double come_to_rest(const std::vector<int>& touching, double speed);
   void remember(int contact, double approach);
@@ -115,8 +115,8 @@ class Driver {
   std::vector<int> staying(const std::vector<int>& touching, const Left& left);
   std::vector<VectorXd> slides_of(const ContactRows& rows, const VectorXd& velocities,
                                   const Left& left);
-  bool lifts(const ContactRows& rows, int k, const AccelerationAnswer& answer) const;
-  ContactMode begins(const ContactRows& rows, int k, const AccelerationAnswer& answer,
+  bool lifts(const ContactRows& rows, int k, const AccelerationSolution& answer) const;
+  ContactMode begins(const ContactRows& rows, int k, const AccelerationSolution& answer,
                      const Left& left) const;
   bool leaves_its_feature(int contact);
   void jam(const ContactRows& rows, const VectorXd& velocities);

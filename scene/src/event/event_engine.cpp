@@ -50,7 +50,7 @@ class EventEngine : public ResumableEngine {
     now_.setZero(model_->coordinates() + model_->velocities() + 1);
     if (begin == Begin::later) return;
     driver_ = std::make_unique<Driver>(*model_, options_, 0.0, model_->start());
-    look();
+    update_results();
   }
 
   const char* name() const override { return "event"; }
@@ -60,16 +60,16 @@ class EventEngine : public ResumableEngine {
     try {
       driver_->advance(t / units_.time, [this] { return interrupted(); });
     } catch (const SimulationError&) {
-      look();
+      update_results();
       throw;
     }
-    look();
+    update_results();
   }
 
   const std::vector<BodyState>& bodies() const override { return bodies_; }
   Diagnostics diagnostics() const override { return diagnostics_; }
   const std::vector<ContactState>& contacts() const override {
-    if (!contacts_known_) look_at_contacts();
+    if (!contacts_known_) find_contact_states();
     return contacts_;
   }
   Forces forces() const override;
@@ -90,9 +90,9 @@ class EventEngine : public ResumableEngine {
  private:
   VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
   StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
-  void look();
-  void look_at_contacts() const;
-  void look_at_events();
+  void update_results();
+  void find_contact_states() const;
+  void append_events();
   void exchange(binary::Archive& io, Driver::Memory& m, double& reached, VectorXd& now) const;
 
   bool far() const { return !origin_.isZero(0); }
@@ -116,7 +116,7 @@ class EventEngine : public ResumableEngine {
   Diagnostics diagnostics_;
 };
 
-void EventEngine::look() {
+void EventEngine::update_results() {
   now_ = driver_->state();
   const smooth::MovingBodies& bodies = model_->bodies();
   bodies.read(model_->bodies_state(), bodies_);
@@ -153,10 +153,10 @@ void EventEngine::look() {
   if (g.size() > 0) d.drift = g.cwiseAbs().maxCoeff() * units_.length;
   smooth::to_si(units_, d);
   diagnostics_ = d;
-  look_at_events();
+  append_events();
 }
 
-void EventEngine::look_at_contacts() const {
+void EventEngine::find_contact_states() const {
   contacts_.clear();
   contacts_known_ = true;
   event::Motion& motion = driver_->motion();
@@ -174,7 +174,7 @@ void EventEngine::look_at_contacts() const {
     if (!model_->is_pair(contact)) continue;
     holders.push_back(contact);
     const FeaturePair& pair = model_->pair(contact);
-    const Touch touch = pair.look(model_->bodies().all());
+    const Touch touch = pair.touch(model_->bodies().all());
     ContactState c;
     c.first = pair.first;
     c.second = pair.second;
@@ -207,7 +207,7 @@ Forces EventEngine::forces() const {
   return out;
 }
 
-void EventEngine::look_at_events() {
+void EventEngine::append_events() {
   const std::vector<EventRecord>& all = driver_->events();
   for (std::size_t k = events_.size(); k < all.size(); ++k) {
     const EventRecord& from = all[k];
@@ -280,7 +280,7 @@ void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
   driver_ = std::make_unique<Driver>(*model, options_, state.time / units_.time, y, start);
   model_ = std::move(model);
   events_.clear();
-  look();
+  update_results();
 }
 
 // The part of a state behind the bodies.
@@ -353,7 +353,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
   if (how == Restore::near) {
     driver_ = std::make_unique<Driver>(*model_, options_, reached,
                                        VectorXd(saved.head(saved.size() - 1)));
-    return look();
+    return update_results();
   }
   driver_ = std::make_unique<Driver>(*model_, options_, m);
   bool arrives = false;
@@ -363,7 +363,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
     throw std::runtime_error(std::string("the saved state cannot be arrived at again: ") +
                              e.what());
   }
-  look();
+  update_results();
   if (!arrives || now_ != saved)
     throw std::runtime_error(
         "the saved state is of another build or machine: the same steps lead to other bits here");

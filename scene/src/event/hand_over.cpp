@@ -1,8 +1,8 @@
 // Tether: events, and steps where they cannot go on (method, section 11). SPDX-License-Identifier:
 // BSD-3-Clause
 //
-// Steps stand in until they have brought the bodies to where the same contacts stay closed: what
-// events could not decide or end (accumulation, a storm) is over then.
+// Time steps take over until the same contacts stay closed for a number of steps: then the
+// accumulation or burst of impacts that stopped the events is over.
 #include <iterator>
 #include <sstream>
 
@@ -16,9 +16,9 @@ namespace {
 
 constexpr binary::Magic kHandedOver = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '3'};
 
-// Steps go on until this many of them have left the same contacts closed. It doubles where events
-// have come less far than that before they were given up again.
-constexpr std::int64_t kCalmSteps = 20, kMostCalmSteps = std::int64_t{1} << 40;
+// Steps go on until this many of them have left the same contacts closed. The number doubles if
+// events failed again within a time of that many steps.
+constexpr std::int64_t kUnchangedSteps = 20, kMostUnchangedSteps = std::int64_t{1} << 40;
 constexpr std::uint64_t kMostHandOvers = 1000;  // then steps go to the end
 
 double energy_of(const Engine& engine) {
@@ -43,7 +43,7 @@ class EventsThenSteps final : public Engine {
     } catch (const SimulationError& e) {  // in impacts at the start
       begin_events(event::Begin::later);
       begin_steps();
-      tell({0, e.what(), {}, {}, 0}, energy_of(*steps_));
+      append_hand_over({0, e.what(), {}, {}, 0}, energy_of(*steps_));
     }
   }
 
@@ -55,7 +55,7 @@ class EventsThenSteps final : public Engine {
   Diagnostics diagnostics() const override { return now().diagnostics(); }
   const std::vector<ContactState>& contacts() const override { return now().contacts(); }
   Forces forces() const override { return now().forces(); }
-  const std::vector<ContactEvent>& events() const override { return told_; }
+  const std::vector<ContactEvent>& events() const override { return all_events_; }
   std::vector<EffectCost> costs() const override { return now().costs(); }
   const std::vector<HandOver>& hand_overs() const override { return hand_overs_; }
 
@@ -97,23 +97,24 @@ class EventsThenSteps final : public Engine {
     return c;
   }
 
-  void tell_events() {
+  void append_events() {
     const std::vector<ContactEvent>& all = events_->events();
-    told_.insert(told_.end(), all.begin() + static_cast<std::ptrdiff_t>(from_events_), all.end());
+    all_events_.insert(all_events_.end(), all.begin() + static_cast<std::ptrdiff_t>(from_events_),
+                       all.end());
     from_events_ = all.size();
   }
-  void tell(HandOver hand_over, double energy) {
+  void append_hand_over(HandOver hand_over, double energy) {
     ContactEvent event;
     event.time = hand_over.time;
     event.kind = ContactEvent::Kind::hand_over;
-    told_.push_back(event);
+    all_events_.push_back(event);
     hand_overs_.push_back(std::move(hand_over));
     energy_ = energy;
-    calm_ = 0;
+    unchanged_steps_ = 0;
     closed_.clear();
   }
   void take_over(const std::string& why);
-  void look_back();
+  void give_back_if_settled();
   void give_back();
   bool may_give_back() const;
   template <class Self>
@@ -126,12 +127,12 @@ class EventsThenSteps final : public Engine {
   std::unique_ptr<event::ResumableEngine> events_;
   std::unique_ptr<stepping::SteppingEngine> steps_;  // while they stand in
   std::vector<HandOver> hand_overs_;
-  std::vector<ContactEvent> told_;
+  std::vector<ContactEvent> all_events_;
   std::size_t from_events_ = 0;
   Counts steps_before_;  // of steps that have given back
   double energy_ = 0;    // at the last hand-over
-  std::int64_t calm_ = 0, enough_ = kCalmSteps;
-  std::vector<int> closed_;  // contacts, for `calm_` steps
+  std::int64_t unchanged_steps_ = 0, required_steps_ = kUnchangedSteps;
+  std::vector<int> closed_;  // contacts, for `unchanged_steps_` steps
 };
 
 void EventsThenSteps::advance(double t) {
@@ -139,7 +140,7 @@ void EventsThenSteps::advance(double t) {
   while (true) {
     if (!steps_) try {
         events_->advance(t);
-        return tell_events();
+        return append_events();
       } catch (const SimulationError& e) {
         take_over(e.what());
       }
@@ -147,26 +148,26 @@ void EventsThenSteps::advance(double t) {
       const double before = time();
       steps_->advance(before + 0.5 * step_);
       if (!(time() > before)) return;  // interrupted
-      look_back();
+      give_back_if_settled();
     }
     if (steps_ || time() >= t) return;
   }
 }
 
 void EventsThenSteps::take_over(const std::string& why) {
-  tell_events();
+  append_events();
   const double since = hand_overs_.empty() ? 0 : *hand_overs_.back().back;
-  const double calm = static_cast<double>(enough_) * step_;
-  if (events_->time() - since >= calm)
-    enough_ = kCalmSteps;
+  const double required_time = static_cast<double>(required_steps_) * step_;
+  if (events_->time() - since >= required_time)
+    required_steps_ = kUnchangedSteps;
   else if (!hand_overs_.empty())
-    enough_ = std::min(2 * enough_, kMostCalmSteps);
+    required_steps_ = std::min(2 * required_steps_, kMostUnchangedSteps);
   begin_steps();
-  tell({events_->time(), why, events_->counts(), {}, 0}, energy_of(*events_));
+  append_hand_over({events_->time(), why, events_->counts(), {}, 0}, energy_of(*events_));
   steps_->begin_at(events_->time(), events_->bodies());
 }
 
-// Not where the event engine has had all the work that it may have.
+// Returns false if the event engine has used up its limits of events or steps.
 bool EventsThenSteps::may_give_back() const {
   const EventOptions& options = *scene_.event;
   const Counts& before = hand_overs_.back().before;
@@ -174,18 +175,19 @@ bool EventsThenSteps::may_give_back() const {
          hand_overs_.size() < kMostHandOvers;
 }
 
-void EventsThenSteps::look_back() {
+void EventsThenSteps::give_back_if_settled() {
   if (!may_give_back()) return;
   std::optional<std::vector<int>> closed = events_->closed_in({time(), bodies(), step_});
-  calm_ = closed && (calm_ == 0 || *closed == closed_) ? calm_ + 1 : 0;
+  unchanged_steps_ =
+      closed && (unchanged_steps_ == 0 || *closed == closed_) ? unchanged_steps_ + 1 : 0;
   if (closed) closed_ = std::move(*closed);
-  if (calm_ < enough_) return;
+  if (unchanged_steps_ < required_steps_) return;
   try {
     give_back();
   } catch (const SimulationError&) {
-    enough_ = std::min(2 * enough_, kMostCalmSteps);
+    required_steps_ = std::min(2 * required_steps_, kMostUnchangedSteps);
   } catch (const std::invalid_argument&) {
-    enough_ = std::min(2 * enough_, kMostCalmSteps);
+    required_steps_ = std::min(2 * required_steps_, kMostUnchangedSteps);
   }
 }
 
@@ -201,10 +203,10 @@ void EventsThenSteps::give_back() {
   event.time = time();
   event.kind = ContactEvent::Kind::resume;
   event.lost = lost;
-  told_.push_back(event);
+  all_events_.push_back(event);
   steps_before_ += counts_of_steps();
   steps_.reset();
-  tell_events();
+  append_events();
 }
 
 template <class Self>
@@ -220,9 +222,10 @@ void EventsThenSteps::exchange_hand_overs(Self& self, binary::Archive& io) {
       if (back >= 0) each.back = back;
     }
   });
-  io(self.energy_, self.calm_, self.enough_);
-  io.demand(std::isfinite(self.energy_) && self.calm_ >= 0 && self.calm_ <= kMostCalmSteps &&
-            self.enough_ >= kCalmSteps && self.enough_ <= kMostCalmSteps);
+  io(self.energy_, self.unchanged_steps_, self.required_steps_);
+  io.demand(std::isfinite(self.energy_) && self.unchanged_steps_ >= 0 &&
+            self.unchanged_steps_ <= kMostUnchangedSteps &&
+            self.required_steps_ >= kUnchangedSteps && self.required_steps_ <= kMostUnchangedSteps);
   io.list(self.closed_, [&](auto& contact) { io(contact); });
 }
 
@@ -262,7 +265,7 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
     exchange_bodies(io, seconds, bodies);
     content.read(magic, sizeof magic);
   }
-  told_.clear();
+  all_events_.clear();
   hand_overs_.clear();
   closed_.clear();
   steps_.reset();

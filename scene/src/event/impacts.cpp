@@ -32,7 +32,7 @@ constexpr double kLeastApproach = 1e-12;  // of the slip
 
 /// Whether the gap of contact k stays where those of the contacts with a force stay: which of them
 /// has none is the solver's choice, and no reason to leave it open.
-bool rests_on_others(const ContactRows& rows, const FrictionAnswer& answer, int k) {
+bool rests_on_others(const ContactRows& rows, const FrictionSolution& answer, int k) {
   const int row = rows.parts()[at(k)].first;
   std::vector<int> others;
   for (std::size_t i = 0; i < answer.regimes.size(); ++i)
@@ -167,14 +167,14 @@ Driver::Impact Driver::expect(const ContactRows& rows, const VectorXd& before, b
 
 // Contacts that close though joints hold their normals: no impulse stops that.
 void Driver::refuse_blocked(const ContactRows& rows, const Impact& impact) {
-  ContactLook look;
+  ContactKinematics kinematics;
   for (std::size_t k = 0; k < impact.hits.size(); ++k) {
     if (!impact.hits[k]) continue;
     const int contact = rows.contacts()[k], row = rows.parts()[k].first;
-    model_.look(contact, look);
-    MatrixXd moved = look.normal.transpose();
+    model_.evaluate_contact(contact, kinematics);
+    MatrixXd moved = kinematics.normal.transpose();
     model_.divide_by_mass(moved);
-    const double alone = look.normal.dot(moved.col(0));
+    const double alone = kinematics.normal.dot(moved.col(0));
     if (!(rows.A()(row, row) <= kHeldByJoints * alone)) continue;
     fail(
         fmt::format("no impulses keep {} apart: joints, prescribed motions or fixed bodies drive "
@@ -190,13 +190,13 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
   const Impact impact = expect(rows, before, plastic);
   refuse_blocked(rows, impact);
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_impact(rows.problem(impact.b), bands().part);
+  const FrictionSolution answer = solve_impact(rows.problem(impact.b), bands().part);
   if (!answer.solved)
     fail(fmt::format("the impact of {} contacts is not solved, to {:.1e} only", set.size(),
                      answer.error));
   double lost = change_velocities(rows.change(answer.x));
   if (impact.fastest > 0) lost += come_to_rest(set, impact.fastest);
-  tell_impacts(rows, impact, before, rows.velocities(u), answer.x, lost);
+  record_impacts(rows, impact, before, rows.velocities(u), answer.x, lost);
 }
 
 // Returns the energy that is lost.
@@ -207,8 +207,8 @@ double Driver::change_velocities(const VectorXd& change) {
   return energy - model_.energy();
 }
 
-void Driver::tell_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
-                          const VectorXd& after, const VectorXd& x, double lost) {
+void Driver::record_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
+                            const VectorXd& after, const VectorXd& x, double lost) {
   double largest = 0;
   for (const ConePart& p : rows.parts())
     if (p.has_normal()) largest = std::max(largest, x[p.first]);
@@ -241,7 +241,7 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const 
   ++counts_.contact_problems;
   std::vector<bool> closed;
   for (const int i : candidates) closed.push_back(motion_.modes()[at(i)].mode != Mode::open);
-  const AccelerationAnswer answer =
+  const AccelerationSolution answer =
       solve_accelerations(rows, slides, bands().of_accelerations(), closed);
   if (!answer.contacts.solved) fail("the forces of closed contacts are not solved");
   const int n = static_cast<int>(candidates.size());
@@ -302,10 +302,10 @@ std::vector<VectorXd> Driver::slides_of(const ContactRows& rows, const VectorXd&
 }
 
 // Whether a contact with a normal opens.
-bool Driver::lifts(const ContactRows& rows, int k, const AccelerationAnswer& answer) const {
+bool Driver::lifts(const ContactRows& rows, int k, const AccelerationSolution& answer) const {
   const ConePart& p = rows.parts()[at(k)];
   if (!p.has_normal()) return false;
-  const FrictionAnswer& forces = answer.contacts;
+  const FrictionSolution& forces = answer.contacts;
   if (forces.regimes[at(k)] == contact::Regime::separating &&
       !(std::abs(forces.w[p.first]) <= kNoChange * answer.scale &&
         rests_on_others(rows, forces, k)))
@@ -320,7 +320,7 @@ bool Driver::lifts(const ContactRows& rows, int k, const AccelerationAnswer& ans
 }
 
 // The mode of a contact that stays closed and had no slip.
-ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationAnswer& answer,
+ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationSolution& answer,
                            const Left& left) const {
   const int i = rows.contacts()[at(k)];
   const VectorXd a = rows.of(k, answer.contacts.w).tail(model_.tangents());
@@ -351,7 +351,7 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities) {
     if (p.has_normal()) problem.b[p.first] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
   }
   ++counts_.contact_problems;
-  const FrictionAnswer answer = solve_friction(problem);
+  const FrictionSolution answer = solve_friction(problem);
   if (!answer.solved) fail("an impact without collision is not solved");
   const double lost = change_velocities(rows.change(answer.x));
   const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));

@@ -3,7 +3,7 @@
 //
 // The first feature is a point of the first body with a radius (the centre of a sphere; a vertex
 // has radius 0), the second a plane, a point or a line of the second body. Each kind has
-//   look(A, B)   gap, gap', gap'' (without accelerations where the frames have none), the normal n
+//   touch(A, B)  gap, gap', gap'' (without accelerations where the frames have none), the normal n
 //                from second to first, the contact point p and its velocity
 // and an `inside(A, B)`: whether the second feature is the one that is nearest there; a plane may
 // be a face with a border.
@@ -27,8 +27,8 @@ struct PointFeature {
   Vector3d at = Vector3d::Zero();
   double radius = 0;
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-             double radius_first) const {
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+              double radius_first) const {
     const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
     const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
     Vector3d n1;
@@ -49,8 +49,8 @@ struct LineFeature {
   Vector3d at = Vector3d::Zero(), along = Vector3d::UnitX();
   double length = 0, radius = 0;
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-             double radius_first) const {
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+              double radius_first) const {
     const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
     const Jet<double> e = direction<2>(B, along);
     const Vector3d s = c.x - b.x, s1 = c.x1 - b.x1, s2 = c.x2 - b.x2;
@@ -85,10 +85,10 @@ struct FeaturePair {
   double rolling = 0, torsional = 0;  ///< m
   double reach = kNoBorder;           ///< of both shapes from the centres of their bodies, together
 
-  Touch look(const Bodies& bodies) const {
+  Touch touch(const Bodies& bodies) const {
     return std::visit(
         [&](const auto& feature) {
-          return feature.look(bodies.frames[at(first)], bodies.frames[at(second)], centre, radius);
+          return feature.touch(bodies.frames[at(first)], bodies.frames[at(second)], centre, radius);
         },
         on_second);
   }

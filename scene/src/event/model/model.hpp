@@ -12,7 +12,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// One potential contact at the state that is set. `u`: the velocities of the model.
-struct ContactLook {
+struct ContactKinematics {
   double gap = 0;                           ///< m; < 0: penetration
   Eigen::RowVectorXd normal;                ///< gap' = normal u + normal_rate
   double normal_rate = 0, normal_rest = 0;  ///< gap'' = normal u' + normal_rest
@@ -81,7 +81,7 @@ class Model {
   virtual void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) = 0;
   virtual std::string joint_name(int /*row*/) const { return "a joint"; }
   virtual std::string contact_name(int /*contact*/) const { return "a contact"; }
-  virtual void look(int contact, ContactLook& out) = 0;
+  virtual void evaluate_contact(int contact, ContactKinematics& out) = 0;
   virtual double gap(int contact, double& rate) = 0;  ///< and its rate
 
   /// Whether the bodies are surely further apart than `by`: spheres around them do not meet. The

@@ -170,8 +170,8 @@ OnLine nearest(const RoundOnLine& pair, const Frame<double>& A, const Frame<doub
 
 }  // namespace
 
-Touch RoundOnPlane::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                         double) const {
+Touch RoundOnPlane::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
+                          double) const {
   const Jet<double> a = mechanics::point<2>(A, first.at), n = direction<2>(B, plane.normal);
   const Jet<double> d = way(mechanics::point<2>(B, plane.at), a);
   const Support::At s = Support(A, first).at(n.x);
@@ -203,8 +203,8 @@ double RoundOnPlane::margin(const Frame<double>& A, const Frame<double>& B, cons
   return least;
 }
 
-Touch RoundOnRound::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                         double) const {
+Touch RoundOnRound::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
+                          double) const {
   const Jet<double> a = mechanics::point<2>(A, first.at);
   const Jet<double> d = way(mechanics::point<2>(B, second.at), a);
   const Support s(A, first), t(B, second);
@@ -216,12 +216,12 @@ Touch RoundOnRound::look(const Frame<double>& A, const Frame<double>& B, const V
 double RoundOnRound::margin(const Frame<double>& A, const Frame<double>& B,
                             const Vector3d& centre) const {
   if (!first.is_disc() && !second.is_disc()) return kNoBorder;
-  const Vector3d n = look(A, B, centre, 0).normal;
+  const Vector3d n = touch(A, B, centre, 0).normal;
   return std::min(margin_of_disc(A, first, -n), margin_of_disc(B, second, n));
 }
 
-Touch RoundOnLine::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                        double) const {
+Touch RoundOnLine::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
+                         double) const {
   const OnLine on = nearest(*this, A, B);
   const Jet<double> a = mechanics::point<2>(A, first.at), e = direction<2>(B, line.along);
   const Jet<double> d = way(mechanics::point<2>(B, line.at + on.along * line.along), a);
@@ -238,8 +238,8 @@ double RoundOnLine::margin(const Frame<double>& A, const Frame<double>& B, const
   return least;
 }
 
-Touch PointOnCircle::look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-                          double radius) const {
+Touch PointOnCircle::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+                           double radius) const {
   const Jet<double> c = mechanics::point<2>(A, centre), x = direction<2>(B, axis);
   const Jet<double> b = mechanics::point<2>(B, at), d = way(b, c);
   // q = v / |v|, v = d without its part along the axis.

@@ -81,7 +81,7 @@ struct RoundOnPlane {
   PlaneFeature plane;
   double disc = 0;  ///< radius of its border, about plane.at; 0: none
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
   double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
   /// A disc is flush with the plane: it touches in more points than one.
   bool is_flush(const Frame<double>& A, const Frame<double>& B) const {
@@ -97,7 +97,7 @@ struct RoundOnPlane {
 struct RoundOnRound {
   Round first, second;
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
   double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
 };
 
@@ -106,7 +106,7 @@ struct RoundOnLine {
   Round first;
   Segment line;
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
   double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
 };
 
@@ -116,8 +116,8 @@ struct PointOnCircle {
   Vector3d at = Vector3d::Zero(), axis = Vector3d::UnitZ();  ///< out of the body
   double circle = 0;
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-             double radius) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+              double radius) const;
   double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const;
 };
 

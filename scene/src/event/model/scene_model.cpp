@@ -36,7 +36,8 @@ double LawContacts::gap(int k, const mechanics::Bodies& bodies, double& rate) co
   return each.gap_at_zero + sign * laws_.value(each.law, bodies);
 }
 
-void LawContacts::look(int k, const mechanics::Bodies& bodies, ContactLook& out) const {
+void LawContacts::evaluate_contact(int k, const mechanics::Bodies& bodies,
+                                   ContactKinematics& out) const {
   const Entry& each = at_place(k);
   const joints::Coordinate& s = laws_.coordinate(each.law);
   const double sign = laws_.sign(each.law);
@@ -171,7 +172,7 @@ double SceneModel::next_kink(double t) const {
 void SceneModel::settle() {
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (!axes_[i].isZero(0) && pairs_[i].is_apart(bodies_.all(), 0)) continue;
-    const Vector3d normal = pairs_[i].look(bodies_.all()).normal;
+    const Vector3d normal = pairs_[i].touch(bodies_.all()).normal;
     if (axes_[i].cross(normal).squaredNorm() > kFarFromNormal) continue;
     Eigen::Index least = 0;
     normal.cwiseAbs().minCoeff(&least);
@@ -237,12 +238,12 @@ void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest
   });
 }
 
-void SceneModel::look(int contact, ContactLook& out) {
-  if (is_law(contact)) return laws_.look(contact - pairs(), bodies_.all(), out);
-  if (is_moment(contact)) return look(moment(contact), out);
+void SceneModel::evaluate_contact(int contact, ContactKinematics& out) {
+  if (is_law(contact)) return laws_.evaluate_contact(contact - pairs(), bodies_.all(), out);
+  if (is_moment(contact)) return evaluate_moment(moment(contact), out);
   const FeaturePair& p = pair(contact);
   const Bodies& bodies = bodies_.all();
-  const Touch touch = p.look(bodies);
+  const Touch touch = p.touch(bodies);
   const Material a(bodies.frames[at(p.first)], touch.point_velocity);
   const Material b(bodies.frames[at(p.second)], touch.point_velocity);
   Vector3d rest = a.rest - b.rest, convey = Vector3d::Zero();
@@ -287,10 +288,10 @@ Jet<double> SceneModel::surface_velocity(int body, const Touch& touch) const {
 
 // Slip e.w of the turning w of one body against the other, e a tangent, or the normal; where it
 // turns, (e.w)' = e.w' + e'.w.
-void SceneModel::look(const Moment& moment, ContactLook& out) {
+void SceneModel::evaluate_moment(const Moment& moment, ContactKinematics& out) {
   const FeaturePair& p = pair(moment.pair);
   const Bodies& bodies = bodies_.all();
-  const Touch touch = p.look(bodies);
+  const Touch touch = p.touch(bodies);
   const Vector3d n = touch.normal, n1 = touch.normal_rate;
   const std::array<Vector3d, 2> t = tangents_of(moment.pair, n);
   const Vector3d c1 = n1.cross(axes_[at(moment.pair)]);
@@ -325,7 +326,7 @@ Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
   const bool turns = is_moment(contact), spins = turns && moment(contact).spin;
   if (turns) contact = moment(contact).pair;
-  const Vector3d normal = pair(contact).look(bodies_.all()).normal;
+  const Vector3d normal = pair(contact).touch(bodies_.all()).normal;
   const std::array<Vector3d, 2> tangent = tangents_of(contact, normal);
   if (spins) return parts[1] * normal;
   return (turns ? 0 : parts[0]) * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
@@ -370,7 +371,7 @@ double SceneModel::square_between(int contact, int other, double distance) {
   if (!is_pair(contact) || !is_pair(other)) return -1;
   const FeaturePair &p = pair(contact), &q = pair(other);
   if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return -1;
-  const Touch a = p.look(bodies_.all()), b = q.look(bodies_.all());
+  const Touch a = p.touch(bodies_.all()), b = q.touch(bodies_.all());
   if ((a.point - b.point).norm() > distance) return -1;
   return a.normal.cross(b.normal).squaredNorm();
 }

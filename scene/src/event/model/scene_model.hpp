@@ -26,7 +26,7 @@ class LawContacts {
   int place(int k) const { return at_place(k).law; }  ///< in all()
   ContactLaw law(int k) const { return at_place(k).of; }
   double gap(int k, const mechanics::Bodies& bodies, double& rate) const;
-  void look(int k, const mechanics::Bodies& bodies, ContactLook& out) const;
+  void evaluate_contact(int k, const mechanics::Bodies& bodies, ContactKinematics& out) const;
   Eigen::Vector3d direction(int k, const mechanics::Bodies& bodies) const;
 
  private:
@@ -81,11 +81,11 @@ class SceneModel final : public Model {
   void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) override;
   std::string joint_name(int row) const override { return "joint \"" + rows_.joint_of(row) + "\""; }
   std::string contact_name(int contact) const override;
-  void look(int contact, ContactLook& out) override;
+  void evaluate_contact(int contact, ContactKinematics& out) override;
   double gap(int contact, double& rate) override {
     if (is_law(contact)) return laws_.gap(contact - pairs(), bodies_.all(), rate);
     if (is_moment(contact)) return rate = 0;
-    const Touch touch = pair(contact).look(bodies_.all());
+    const Touch touch = pair(contact).touch(bodies_.all());
     rate = touch.rate;
     return touch.gap;
   }
@@ -154,7 +154,7 @@ class SceneModel final : public Model {
   bool conveys(int body) const { return !surface_.empty() && surface_[at(body)].has_value(); }
   /// Velocity of the surface of a body at a point, and its rate where the point moves.
   Jet<double> surface_velocity(int body, const Touch& touch) const;
-  void look(const Moment& moment, ContactLook& out);
+  void evaluate_moment(const Moment& moment, ContactKinematics& out);
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
 

@@ -32,8 +32,8 @@ struct PlaneFeature {
   Vector3d at = Vector3d::Zero(), normal = Vector3d::UnitZ();
   std::vector<std::pair<Vector3d, double>> border;  ///< in the axes of the body
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-             double radius) const {
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
+              double radius) const {
     const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
     const Jet<double> n = direction<2>(B, normal);
     const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
@@ -88,7 +88,7 @@ using scene::Segment;
 struct CrossingFeature {
   Segment first, second;
 
-  Touch look(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
   double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
 
  private:
@@ -101,8 +101,8 @@ struct CrossingFeature {
   static constexpr double kParallel = 1e-9;  // squared sine
 };
 
-inline Touch CrossingFeature::look(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                                   double) const {
+inline Touch CrossingFeature::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
+                                    double) const {
   using mechanics::direction;
   const Jet<double> a = mechanics::point<2>(A, first.at), b = mechanics::point<2>(B, second.at);
   const Jet<double> e = direction<2>(A, first.along), f = direction<2>(B, second.along);

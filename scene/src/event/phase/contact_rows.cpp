@@ -35,14 +35,14 @@ ContactRows::ContactRows(Model& model, std::vector<int> contacts)
 
 // A limit has no slip, a bounded law and a moment have no normal of their own.
 void ContactRows::take_rows() {
-  std::vector<ContactLook> looks(contacts_.size());
+  std::vector<ContactKinematics> kinematics(contacts_.size());
   int rows = 0;
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     const ContactLaw law = model_.law(contacts_[k]);
-    model_.look(contacts_[k], looks[k]);
+    model_.evaluate_contact(contacts_[k], kinematics[k]);
     ConePart p;
     p.first = rows;
-    p.slips = law.is_line() ? 1 : looks[k].tangents.isZero(0) ? 0 : model_.tangents();
+    p.slips = law.is_line() ? 1 : kinematics[k].tangents.isZero(0) ? 0 : model_.tangents();
     p.mu = law.is_bounded() ? 0 : law.friction;
     p.bound = std::max(0.0, law.bound);
     if (law.has_normal()) p.normal = rows;
@@ -60,13 +60,13 @@ void ContactRows::take_rows() {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     const ConePart& p = parts_[k];
     if (p.has_normal()) {
-      L_.row(p.first) = looks[k].normal;
-      rate_[p.first] = looks[k].normal_rate;
-      rest_[p.first] = looks[k].normal_rest;
+      L_.row(p.first) = kinematics[k].normal;
+      rate_[p.first] = kinematics[k].normal_rate;
+      rest_[p.first] = kinematics[k].normal_rest;
     }
-    L_.middleRows(p.slip(), p.slips) = looks[k].tangents.topRows(p.slips);
-    p.slip_of(rate_) = looks[k].slip_rate.head(p.slips);
-    p.slip_of(rest_) = looks[k].slip_rest.head(p.slips);
+    L_.middleRows(p.slip(), p.slips) = kinematics[k].tangents.topRows(p.slips);
+    p.slip_of(rate_) = kinematics[k].slip_rate.head(p.slips);
+    p.slip_of(rest_) = kinematics[k].slip_rest.head(p.slips);
   }
 }
 

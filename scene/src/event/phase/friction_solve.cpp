@@ -62,7 +62,7 @@ struct Product {
 };
 
 /// Sticking where the rest of the limit, as a velocity, is at least the slip.
-Regime regime_of(const FrictionProblem& problem, const ConePart& p, const FrictionAnswer& found) {
+Regime regime_of(const FrictionProblem& problem, const ConePart& p, const FrictionSolution& found) {
   if (p.normal >= 0 && !(problem.A(p.normal, p.normal) * found.x[p.normal] > found.w[p.normal]))
     return Regime::separating;
   if (p.slips == 0) return Regime::sliding;
@@ -84,8 +84,8 @@ class ProductSolver {
           return options;
         }()) {}
 
-  FrictionAnswer solve(const FrictionProblem& problem) {
-    FrictionAnswer out;
+  FrictionSolution solve(const FrictionProblem& problem) {
+    FrictionSolution out;
     out.x.setZero(problem.b.size());
     out.w = -problem.b;
     out.regimes.assign(problem.parts.size(), Regime::separating);
@@ -144,7 +144,7 @@ std::vector<int> held_rows(const FrictionProblem& problem, const Regimes& regime
   return rows;
 }
 
-void take(const SharedForces& from, const Regimes& regimes, FrictionAnswer& to) {
+void take(const SharedForces& from, const Regimes& regimes, FrictionSolution& to) {
   to.x = from.x;
   to.w = from.w;
   to.regimes = regimes.of;
@@ -155,7 +155,7 @@ void take(const SharedForces& from, const Regimes& regimes, FrictionAnswer& to) 
 /// The shortest forces with the regimes of an answer: what begins to slip goes against its force.
 /// Keeps contacts closed that are `closed` or do not open. The answer stays where the law has none.
 bool settle(const std::vector<bool>& closed, double none, const FrictionProblem& problem,
-            Regimes held, FrictionAnswer& answer) {
+            Regimes held, FrictionSolution& answer) {
   for (std::size_t k = 0; k < problem.parts.size(); ++k) {
     const ConePart& p = problem.parts[k];
     if (p.has_normal() && answer.regimes[k] == Regime::separating &&
@@ -175,13 +175,13 @@ bool settle(const std::vector<bool>& closed, double none, const FrictionProblem&
 /// way: from soft to stiff, the first answer whose regimes hold for rigid contacts, too.
 /// `with_slips`: the problem with S.
 bool solve_compliant(const std::vector<bool>& closed, double none, FrictionProblem with_slips,
-                     const FrictionProblem& problem, const Regimes& held, FrictionAnswer& out) {
+                     const FrictionProblem& problem, const Regimes& held, FrictionSolution& out) {
   ProductSolver solver(kCompliantWork);
-  FrictionAnswer answer;
+  FrictionSolution answer;
   for (double part = 1; part >= kStiffest; part *= kStiffer) {
     with_slips.A = problem.A;
     with_slips.A.diagonal().array() += part * problem.A.diagonal().mean();
-    const FrictionAnswer found = solver.solve(with_slips);
+    const FrictionSolution found = solver.solve(with_slips);
     if (!found.solved) return false;
     if (found.regimes == answer.regimes) continue;
     answer = found;
@@ -194,10 +194,10 @@ bool solve_compliant(const std::vector<bool>& closed, double none, FrictionProbl
 
 /// All held if the law has any forces for that, else by an iteration, whose answer is settled where
 /// `decides` and forces are shared in several ways.
-FrictionAnswer solve_shared(FrictionProblem& problem, const std::vector<VectorXd>& slides,
-                            double band, double far, const std::vector<bool>& closed,
-                            bool decides) {
-  FrictionAnswer out;
+FrictionSolution solve_shared(FrictionProblem& problem, const std::vector<VectorXd>& slides,
+                              double band, double far, const std::vector<bool>& closed,
+                              bool decides) {
+  FrictionSolution out;
   Regimes held = all_held(problem, slides);
   problem.b = without_contradictions(problem.A, problem.b, held_rows(problem, held), band);
   const SharedForces shared = share_forces(problem, held);
@@ -221,8 +221,8 @@ FrictionAnswer solve_shared(FrictionProblem& problem, const std::vector<VectorXd
 
 }  // namespace
 
-AccelerationAnswer solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
-                                       double part, const std::vector<bool>& closed) {
+AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
+                                         double part, const std::vector<bool>& closed) {
   FrictionProblem problem = rows.problem(-rows.free_accelerations());
   std::vector<VectorXd> turning = slides;
   VectorXd known = VectorXd::Zero(problem.b.size());
@@ -234,7 +234,7 @@ AccelerationAnswer solve_accelerations(ContactRows& rows, const std::vector<Vect
     turning[k] = VectorXd();
   }
   problem.b -= problem.A * known;
-  AccelerationAnswer out;
+  AccelerationSolution out;
   out.scale = problem.b.cwiseAbs().maxCoeff();
   out.contacts = solve_shared(problem, turning, part * out.scale,
                               kFarAbove * std::max(out.scale, 1e-12), closed, !closed.empty());
@@ -245,13 +245,13 @@ AccelerationAnswer solve_accelerations(ContactRows& rows, const std::vector<Vect
   return out;
 }
 
-FrictionAnswer solve_impact(FrictionProblem problem, double band) {
+FrictionSolution solve_impact(FrictionProblem problem, double band) {
   if (!problem.A.allFinite() || !problem.b.allFinite()) return solve_friction(problem);
   return solve_shared(problem, {}, band, 0, {}, true);
 }
 
-FrictionAnswer solve_friction(const FrictionProblem& problem) {
-  FrictionAnswer out = ProductSolver().solve(problem);
+FrictionSolution solve_friction(const FrictionProblem& problem) {
+  FrictionSolution out = ProductSolver().solve(problem);
   if (out.solved) sharpen(problem, out);
   return out;
 }

@@ -9,11 +9,11 @@ namespace tether::scene::event {
 
 /// Coulomb's law, exact to round-off where the regimes that the contact library finds allow.
 /// Contacts that the joints lock (A_nn = 0) carry nothing.
-FrictionAnswer solve_friction(const FrictionProblem& problem);
+FrictionSolution solve_friction(const FrictionProblem& problem);
 
 /// The same of an impact: of contacts that share their impulses all stop if the law has any
 /// impulses for that; always the shortest ones. `band`: error of velocities.
-FrictionAnswer solve_impact(FrictionProblem problem, double band);
+FrictionSolution solve_impact(FrictionProblem problem, double band);
 
 /// Coulomb's law for accelerations at the state that is set: w = A x - b = (a_n, a_t) where a
 /// contact has no slip, and (a_n, S d + a_t) where it slides along d (else empty), S far above all
@@ -23,11 +23,11 @@ FrictionAnswer solve_impact(FrictionProblem problem, double band);
 /// Contacts that share their forces all stay at rest if the law has any forces for that, else
 /// those that are `closed` stay so: the shortest forces, and then no S in w. `part`: error of the
 /// accelerations.
-struct AccelerationAnswer {
-  FrictionAnswer contacts;
+struct AccelerationSolution {
+  FrictionSolution contacts;
   double scale = 0;  ///< of the accelerations without forces
 };
-AccelerationAnswer solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
-                                       double part, const std::vector<bool>& closed = {});
+AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
+                                         double part, const std::vector<bool>& closed = {});
 
 }  // namespace tether::scene::event

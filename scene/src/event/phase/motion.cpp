@@ -35,20 +35,20 @@ void Motion::set(double t, const double* y) {
   u_ = Eigen::Map<const VectorXd>(y + nq_, nu_);
 }
 
-VectorXd Motion::slip_of(const ContactLook& look) const {
-  return look.tangents * u_ + look.slip_rate;
+VectorXd Motion::slip_of(const ContactKinematics& kinematics) const {
+  return kinematics.tangents * u_ + kinematics.slip_rate;
 }
 
 VectorXd Motion::slip_rate(int closed) const {
-  const ContactLook& look = looks_[index(closed)];
-  return look.tangents * a_ + look.slip_rest;
+  const ContactKinematics& kinematics = kinematics_[index(closed)];
+  return kinematics.tangents * a_ + kinematics.slip_rest;
 }
 
 // Slip that ends passes through zero within a step: its direction stays.
 VectorXd Motion::held_slip(int closed) const {
   const int contact = closed_[index(closed)];
   const VectorXd& direction = modes_[index(contact)].direction;
-  VectorXd s = slip_of(looks_[index(closed)]);
+  VectorXd s = slip_of(kinematics_[index(closed)]);
   const double along = s.dot(direction), least = bands_.slip(contact);
   if (along < least) s += (least - along) * direction;
   return s;
@@ -62,7 +62,7 @@ void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
     const int contact = closed_[k];
     const ContactLaw law = model_.law(contact);
     if (sticks(k) || law.friction == 0 || law.is_bounded()) continue;
-    model_.look(contact, looks_[k]);
+    model_.evaluate_contact(contact, kinematics_[k]);
     slips.segment(size, tangents_) = held_slip(static_cast<int>(k));
     size += tangents_;
   }
@@ -89,7 +89,7 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
     if (modes_[index(i)].mode == Mode::open) levels_[index(i)] = model_.gap(i, rate);
   }
   modes_ = std::move(modes);
-  looks_.resize(closed_.size());
+  kinematics_.resize(closed_.size());
   row_of_.resize(closed_.size());
   find_holders();
   choose_joints();
@@ -190,25 +190,25 @@ void Motion::gather() {
   smallest_slip_ = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k];
-    ContactLook& look = looks_[k];
-    model_.look(closed_[k], look);
+    ContactKinematics& kinematics = kinematics_[k];
+    model_.evaluate_contact(closed_[k], kinematics);
     if (normals_of(k) > 0) {
-      R_.row(row) = look.normal;
-      C_.col(row) = look.normal.transpose();
-      r_[row] = look.normal_rest;
+      R_.row(row) = kinematics.normal;
+      C_.col(row) = kinematics.normal.transpose();
+      r_[row] = kinematics.normal_rest;
     }
     if (const int n = tangents_of(k); n > 0) {
       const int first = row + normals_of(k);
-      R_.middleRows(first, n) = look.tangents.topRows(n);
-      C_.middleCols(first, n) = look.tangents.topRows(n).transpose();
-      r_.segment(first, n) = look.slip_rest.head(n);
+      R_.middleRows(first, n) = kinematics.tangents.topRows(n);
+      C_.middleCols(first, n) = kinematics.tangents.topRows(n).transpose();
+      r_.segment(first, n) = kinematics.slip_rest.head(n);
     }
     if (sticks(k) || is_bounded(k)) continue;
     const double mu = model_.law(closed_[k]).friction;
     if (mu == 0) continue;
     const VectorXd s = held_slip(static_cast<int>(k));
     smallest_slip_ = std::min(smallest_slip_, s.norm());
-    C_.col(normal_row(k)) -= mu / s.norm() * look.tangents.transpose() * s;
+    C_.col(normal_row(k)) -= mu / s.norm() * kinematics.tangents.transpose() * s;
   }
 }
 
@@ -256,7 +256,7 @@ void Motion::prepare(double t, const double* y) {
   model_.forces(h_);
   for (std::size_t k = 0; k < closed_.size(); ++k)
     if (is_bounded(k) && !sticks(k))
-      h_ += looks_[k].tangents.transpose() * friction_force(static_cast<int>(k));
+      h_ += kinematics_[k].tangents.transpose() * friction_force(static_cast<int>(k));
   a_ = h_;
   model_.divide_by_mass(a_);
   if (rows_ == 0) return;
@@ -285,8 +285,8 @@ void Motion::finish_rate(double* y_rate) {
   for (int i = 0; i < joints_; ++i) power -= lambda_[i] * joint_rate_[i];
   for (std::size_t k = 0; k < closed_.size(); ++k)
     // On the bodies: a motor and a belt work at their speeds, too.
-    if (is_bounded(k) || !sticks(k) || !looks_[k].slip_rate.isZero(0))
-      power += friction_force(static_cast<int>(k)).dot(looks_[k].tangents * u_);
+    if (is_bounded(k) || !sticks(k) || !kinematics_[k].slip_rate.isZero(0))
+      power += friction_force(static_cast<int>(k)).dot(kinematics_[k].tangents * u_);
   y_rate[work()] = power;
 }
 
@@ -307,7 +307,7 @@ std::vector<VectorXd> Motion::slides() const {
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const ContactMode& mode = modes_[index(closed_[k])];
     if (mode.mode != Mode::slide) continue;
-    const VectorXd s = slip_of(looks_[k]);
+    const VectorXd s = slip_of(kinematics_[k]);
     const bool fast = s.dot(mode.direction) > bands_.slip(closed_[k]);
     out[k] = fast ? VectorXd(s.normalized()) : mode.direction;
   }
@@ -344,7 +344,8 @@ std::vector<VectorXd> Motion::contact_forces() {
   }
   if (lawful || !hyperstatic_) return out;
   ContactRows rows(model_, closed_);
-  const AccelerationAnswer answer = solve_accelerations(rows, slides(), bands_.of_accelerations());
+  const AccelerationSolution answer =
+      solve_accelerations(rows, slides(), bands_.of_accelerations());
   if (!answer.contacts.solved) return out;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const VectorXd force = rows.of(static_cast<int>(k), answer.contacts.x);
@@ -396,10 +397,10 @@ void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k], tangents = tangents_of(k);
     if (normals_of(k) > 0) {
-      positions[row] = looks_[k].gap - levels_[index(closed_[k])];
-      rates[row] += looks_[k].normal_rate;
+      positions[row] = kinematics_[k].gap - levels_[index(closed_[k])];
+      rates[row] += kinematics_[k].normal_rate;
     }
-    rates.segment(row + normals_of(k), tangents) += looks_[k].slip_rate.head(tangents);
+    rates.segment(row + normals_of(k), tangents) += kinematics_[k].slip_rate.head(tangents);
   }
 }
 
@@ -437,11 +438,12 @@ void Motion::differentiate_contacts(int j, double step, const VectorXd& rates, i
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k], normals = normals_of(k), rows = normals + tangents_of(k);
     if (rows == 0 || R_.block(row, block * body, rows, block).isZero(0)) continue;
-    ContactLook& look = looks_[k];
-    model_.look(closed_[k], look);
+    ContactKinematics& kinematics = kinematics_[k];
+    model_.evaluate_contact(closed_[k], kinematics);
     now.resize(rows);
-    if (normals > 0) now[0] = look.normal.dot(u_) + look.normal_rate;
-    now.tail(rows - normals) = (look.tangents * u_ + look.slip_rate).head(rows - normals);
+    if (normals > 0) now[0] = kinematics.normal.dot(u_) + kinematics.normal_rate;
+    now.tail(rows - normals) =
+        (kinematics.tangents * u_ + kinematics.slip_rate).head(rows - normals);
     for (int r = 0; r < rows; ++r)
       if (const int place = rate_place_[index(row + r)]; place >= 0)
         C(first_rate + place, j) = (now[r] - rates[row + r]) / step;

@@ -55,17 +55,18 @@ inline Bands bands_of(Model& model, double tolerance) {
   const VectorXd sizes = model.sizes();
   const int nq = model.coordinates(), nu = model.velocities();
   VectorXd gradient(nq);
-  ContactLook look;
+  ContactKinematics kinematics;
   for (int i = 0; i < model.contacts(); ++i) {
-    model.look(i, look);
+    model.evaluate_contact(i, kinematics);
     gradient.setZero();
-    model.to_coordinates(look.normal.data(), gradient.data());
+    model.to_coordinates(kinematics.normal.data(), gradient.data());
     const auto speeds = sizes.segment(nq, nu).array();
     const double gap = (gradient.array() * sizes.head(nq).array()).matrix().norm();
-    const double approach = (look.normal.transpose().array() * speeds).matrix().norm();
+    const double approach = (kinematics.normal.transpose().array() * speeds).matrix().norm();
     double slip = 0;
-    for (int k = 0; k < look.tangents.rows(); ++k)
-      slip = std::max(slip, (look.tangents.row(k).transpose().array() * speeds).matrix().norm());
+    for (int k = 0; k < kinematics.tangents.rows(); ++k)
+      slip =
+          std::max(slip, (kinematics.tangents.row(k).transpose().array() * speeds).matrix().norm());
     out.gaps.push_back(tolerance * part_of(gap));
     out.approaches.push_back(std::max(tolerance, kLeastSpeed) * part_of(approach));
     out.slips.push_back(tolerance * part_of(slip));
@@ -133,8 +134,8 @@ class Motion {
   bool forces_are_lawful() const;
   /// Directions of the closed contacts that slide; empty where they stick.
   std::vector<VectorXd> slides() const;
-  const ContactLook& look(int closed) const { return looks_[index(closed)]; }
-  VectorXd slip(int closed) const { return slip_of(looks_[index(closed)]); }
+  const ContactKinematics& kinematics(int closed) const { return kinematics_[index(closed)]; }
+  VectorXd slip(int closed) const { return slip_of(kinematics_[index(closed)]); }
   VectorXd slip_rate(int closed) const;            ///< at the state of the last rate()
   double work_done() const { return work_done_; }  ///< operations, roughly
   /// Slips of the contacts that slide with friction at (t, y), one after the other.
@@ -157,7 +158,7 @@ class Motion {
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
-  VectorXd slip_of(const ContactLook& look) const;
+  VectorXd slip_of(const ContactKinematics& kinematics) const;
   VectorXd held_slip(int closed) const;
   bool is_bounded(std::size_t closed) const { return model_.law(closed_[closed]).is_bounded(); }
   bool sticks(std::size_t closed) const {
@@ -190,8 +191,8 @@ class Motion {
   std::vector<ContactMode> modes_;  // of all contacts
   std::vector<double> levels_;
   std::vector<int> closed_, row_of_;
-  std::vector<std::size_t> holder_;  // place of the contact whose normal force it has
-  std::vector<ContactLook> looks_;   // of the closed ones
+  std::vector<std::size_t> holder_;            // place of the contact whose normal force it has
+  std::vector<ContactKinematics> kinematics_;  // of the closed ones
   int rows_ = 0, joints_ = 0;
   std::vector<int> joints_in_use_;
   double least_joint_row_ = 1;  // what a row in use added to the others, of its length

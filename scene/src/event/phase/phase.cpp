@@ -13,10 +13,10 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kFirstAtMost = 0.1;
-constexpr double kDifference = 1e-7, kOfSlip = 1e-3;
-constexpr double kTurned = 0.5;  // of a slip, since Newton's matrix was made
-constexpr double kMoved = 1e-5;  // of the state, since d(y')/dy was found
+constexpr double kLongestFirstStep = 0.1;
+constexpr double kIncrement = 1e-7, kLargestIncrement = 1e-3;
+constexpr double kLargestSlipChange = 0.5;    // of a slip, since Newton's matrix was made
+constexpr double kLargestStateChange = 1e-5;  // of the state, since d(y')/dy was found
 
 #if SUNDIALS_VERSION_MAJOR >= 7
 using Flag = sunbooleantype;
@@ -67,7 +67,7 @@ Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, cons
   motion.rate(start, y0.data(), rate0.data());
   const VectorXd id = VectorXd::Ones(N);
   session.emplace(context, IdaSession::Start{0, y0, rate0, id}, residual, weights, this, max_step);
-  const FirstStep first{tolerance, kFirstAtMost, sizes,
+  const FirstStep first{tolerance, kLongestFirstStep, sizes,
                         [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
                           motion.rate(start + at, ahead.data(), rate_ahead.data());
                         }};
@@ -125,7 +125,7 @@ bool Phase::Ida::has_turned(double t, N_Vector predicted) {
   const Eigen::Index n = motion.model().tangents();
   for (Eigen::Index k = 0; k < slips.size(); k += n) {
     const auto now = slips.segment(k, n), then = slips_of_matrix.segment(k, n);
-    if ((now - then).norm() > kTurned * std::min(now.norm(), then.norm())) return true;
+    if ((now - then).norm() > kLargestSlipChange * std::min(now.norm(), then.norm())) return true;
   }
   return false;
 }
@@ -149,7 +149,8 @@ bool Phase::Ida::may_reuse(double t, N_Vector at) {
   if (failed || slope_at.size() == 0) return false;
   for (Eigen::Index i = 0; i < slope_at.size(); ++i) {
     const double there = N_VGetArrayPointer(at)[i];
-    if (!(std::abs(there - slope_at[i]) <= kMoved * size_of(static_cast<int>(i), there)))
+    if (!(std::abs(there - slope_at[i]) <=
+          kLargestStateChange * size_of(static_cast<int>(i), there)))
       return false;
   }
   return !has_turned(t, at);
@@ -161,12 +162,12 @@ void Phase::Ida::differentiate(double t, const double* from) {
   near = slope_at = Eigen::Map<const VectorXd>(from, N);
   motion.rate(start + t, near.data(), rate.data());
   // Friction turns with the slip: differences are short against it.
-  const double longest = kOfSlip * motion.smallest_slip();
+  const double longest = kLargestIncrement * motion.smallest_slip();
   slope.setZero(N, N);
   for (int j = 0; j < N; ++j) {
     if (j == motion.work()) continue;
     const double kept = near[j];
-    double step = kDifference * std::max(sizes[j], std::abs(kept));
+    double step = kIncrement * std::max(sizes[j], std::abs(kept));
     if (j >= motion.coordinates()) step = std::min(step, longest);
     near[j] = kept + step;
     motion.rate(start + t, near.data(), near_rate.data());

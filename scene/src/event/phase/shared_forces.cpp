@@ -277,7 +277,7 @@ SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes) {
   return out;
 }
 
-void sharpen(const FrictionProblem& problem, FrictionAnswer& answer) {
+void sharpen(const FrictionProblem& problem, FrictionSolution& answer) {
   const std::size_t n = problem.parts.size();
   Regimes regimes{answer.regimes, std::vector<VectorXd>(n), {}};
   const auto slides = [&](std::size_t i) { return regimes.of[i] == Regime::sliding; };

@@ -71,7 +71,7 @@ struct SharedForces {
 SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes);
 
 /// Answer of a frictional problem.
-struct FrictionAnswer {
+struct FrictionSolution {
   bool solved = false;
   VectorXd x, w;
   std::vector<contact::Regime> regimes;
@@ -80,7 +80,7 @@ struct FrictionAnswer {
 
 /// Solves the linear equations of the answer's regimes, which removes the error of the iteration:
 /// stuck rows vanish, and sliding forces have their limit. Kept only if it obeys the law.
-void sharpen(const FrictionProblem& problem, FrictionAnswer& answer);
+void sharpen(const FrictionProblem& problem, FrictionSolution& answer);
 
 /// Projects b onto the range of A restricted to these rows, if that changes it by at most `band`.
 /// Dependent rows contradict each other by the error of the state; no solution would obey all of

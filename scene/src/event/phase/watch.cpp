@@ -158,7 +158,7 @@ double Watcher::support() {
   const std::vector<VectorXd> slides = motion_.slides();
   const bool sliding = std::any_of(slides.begin(), slides.end(),
                                    [](const VectorXd& each) { return each.size() > 0; });
-  const AccelerationAnswer answer = solve_accelerations(rows, slides, bands().of_accelerations());
+  const AccelerationSolution answer = solve_accelerations(rows, slides, bands().of_accelerations());
   if (!answer.contacts.solved) return -answer.scale;
   double largest = 0;
   for (std::size_t k = 0; k < slides.size(); ++k) {
@@ -335,7 +335,7 @@ bool Watcher::dips(Phase& phase, const Function& f) {
   const double turns = (f.slope - f.slope_before) / (end_ - begin_);
   const double tells = 0.5 * std::pow(kUnseen * bands().approach(f.contact), 2) / turns;
   const double tolerance = tells / (kKnown * part);
-  if (tolerance < doubt_.tolerance) doubt_ = {when, tolerance};
+  if (tolerance < undecided_.tolerance) undecided_ = {when, tolerance};
   return false;
 }
 
@@ -368,14 +368,14 @@ bool Watcher::is_hit_between(Phase& phase, Function& f) {
   return false;
 }
 
-std::optional<Zero> Watcher::look(Phase& phase) {
+std::optional<Zero> Watcher::first_zero(Phase& phase) {
   phase.at(phase.step_end(), y_);
   const VectorXd at_end = y_;
   const double by = way(phase, at_end);
   wake(phase, at_end, by);
   evaluate(phase.start() + phase.step_end(), at_end, by);
   std::optional<Zero> first;
-  doubt_ = {0, std::numeric_limits<double>::infinity()};
+  undecided_ = {0, std::numeric_limits<double>::infinity()};
   for (Function& f : functions_) {
     if (!f.far && f.value == kNowhere) {
       f.dormant = true;
@@ -399,8 +399,8 @@ std::optional<Zero> Watcher::look(Phase& phase) {
     }
     if (!first || zero.time < first->time) first = std::move(zero);
   }
-  if (first && first->time < doubt_.time)
-    doubt_.tolerance = std::numeric_limits<double>::infinity();
+  if (first && first->time < undecided_.time)
+    undecided_.tolerance = std::numeric_limits<double>::infinity();
   if (!first)
     for (Function& f : functions_) {
       if (f.far) continue;

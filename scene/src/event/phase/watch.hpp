@@ -35,11 +35,11 @@ class Watcher {
 
   /// A phase begins at (t, y). `leaving`: contacts that move apart though their gaps are zero.
   void begin(double t, const VectorXd& y, const std::vector<bool>& leaving);
-  /// The first event in the last step of the phase.
-  std::optional<Zero> look(Phase& phase);
-  /// The tolerance of a phase that would tell whether gaps that turned in the last step, before its
-  /// event, were zero there; infinite where this one does.
-  double telling_tolerance() const { return doubt_.tolerance; }
+  /// Returns the first event in the last step of the phase, if there is one.
+  std::optional<Zero> first_zero(Phase& phase);
+  /// Returns the tolerance at which a phase would decide whether gaps that turned in the last step,
+  /// before its event, were zero there; infinite if the present phase decides it.
+  double deciding_tolerance() const { return undecided_.tolerance; }
 
  private:
   struct Function {
@@ -83,7 +83,7 @@ class Watcher {
   double support_band_ = 0;  // of accelerations
   struct {
     double time, tolerance;
-  } doubt_ = {};
+  } undecided_ = {};
 };
 
 }  // namespace tether::scene::event
