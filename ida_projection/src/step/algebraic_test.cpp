@@ -8,8 +8,8 @@
 // about 1/(k+1). The tolerance grows by a multiple of that. Where y_a does not answer to the move
 // it stays as it is, however far the step leads.
 //
-// Where F jumps in time, as under a force that is switched, y_a jumps with it. Steps that reach
-// beyond fail the test however short they are, and those that do not are accepted, without end. The
+// A jump of F in time, as under a force that is switched, makes y_a jump, too. Steps that reach
+// beyond it fail the test however short they are, and those before it are accepted without end. The
 // test is left out then until steps are as long again as the first one that was refused.
 #include "step/algebraic_test.hpp"
 
