@@ -53,6 +53,19 @@ Scene everything() {
   spring.rest = 0;
   spring.damping = 0;
   s.springs.push_back(spring);
+  // Twice on one body, and twice through the world.
+  spring.second = 4;
+  spring.rest = 0.5;
+  spring.stiffness = 2;
+  spring.damping = 0.4;
+  spring.cable = Cable{{{2, Vector3d(0.3, 1, 0.2)},
+                        {kWorld, Vector3d(2, 1, -1)},
+                        {6, Vector3d(1, 2, 0.7)},
+                        {6, Vector3d(0.2, 1.5, 0.4)},
+                        {2, Vector3d(1, 0.5, 0.1)},
+                        {kWorld, Vector3d(-1, 1, -2)}},
+                       -0.3};
+  s.springs.push_back(spring);
   s.bodies[2].drag.emplace();
   s.bodies[2].drag->linear = 0.3;
   s.bodies[2].drag->quadratic = 0.2;

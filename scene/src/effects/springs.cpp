@@ -7,6 +7,7 @@
 
 #include "mechanics/effect.hpp"
 #include "mechanics/pair_forces.hpp"
+#include "tension.hpp"
 
 namespace tether::scene::effects {
 
@@ -16,6 +17,7 @@ namespace {
 
 /// A spring in the axes of its bodies.
 struct Item {
+  std::size_t index;  // of the scene's springs
   int first, second;
   Vector3d at_first, at_second;
   double stiffness, damping, rest;
@@ -72,8 +74,11 @@ S Item::power(double, const Frame<S>& A, const Frame<S>& B) const {
 class SpringForces : public PairForces<Item> {
  public:
   SpringForces(const std::vector<Spring>& springs, const Bodies& bodies) {
-    for (const Spring& each : springs) {
+    for (std::size_t i = 0; i < springs.size(); ++i) {
+      const Spring& each = springs[i];
+      if (each.cable) continue;
       Item item;
+      item.index = i;
       item.first = bodies.index(each.first);
       item.second = bodies.index(each.second);
       item.at_first = point_in(bodies.frames[at(item.first)], each.at);
@@ -91,30 +96,17 @@ class SpringForces : public PairForces<Item> {
       const Span<double> span(each, bodies.frames[at(each.first)], bodies.frames[at(each.second)]);
       const double length = span.d.norm();
       const double rate = length > 0 ? span.d.dot(span.rate()) / length : 0;
-      forces.springs.push_back(
-          {each.stiffness * (length - each.rest) + each.damping * rate, span.a.x, span.b.x});
+      report_tension(
+          each.index,
+          {each.stiffness * (length - each.rest) + each.damping * rate, span.a.x, span.b.x},
+          forces);
     }
   }
-  // Explicit springs of a semi-implicit step need dt^2 k / m < 4 and dt c / m < 2; together
-  // dt^2 k + 2 dt c < 4 m.
   void check_step(const Scene& scene, const Bodies& bodies, double dt) const override {
-    // The largest inverse mass of the point in any direction.
-    const auto softness = [&](int body, const Vector3d& where) {
-      if (!bodies.moves(body)) return 0.0;
-      const Inertia& inertia = bodies.inertia[at(body)];
-      return 1 / inertia.mass + where.squaredNorm() * inertia.inverse.trace();
-    };
-    for (std::size_t i = 0; i < items().size(); ++i) {
-      const Item& s = items()[i];
-      const double inverse = softness(s.first, s.at_first) + softness(s.second, s.at_second);
-      if ((dt * s.stiffness + 2 * s.damping) * dt * inverse < 4) continue;
-      const double c = 2 * s.damping * inverse, k = s.stiffness * inverse;
-      const double most = k > 0 ? (std::sqrt(c * c + 16 * k) - c) / (2 * k) : 4 / c;
-      throw std::invalid_argument(fmt::format(
-          "{}:{}: spring \"{}\": a step of {:g} s is too long for it to be stable; stepping.step "
-          "must be below about {:g} s (or, without contacts, use the smooth engine)",
-          scene.file, scene.springs[i].place.line, scene.springs[i].name, dt, most));
-    }
+    for (const Item& s : items())
+      check_tension_step(
+          scene, scene.springs[s.index],
+          softness(bodies, s.first, s.at_first) + softness(bodies, s.second, s.at_second), dt);
   }
   // A damper sees the velocities at the end of the last step, which vanish at rest, whatever holds
   // the body; what the forces of this step add, contacts and joints may take away. One after the
@@ -156,6 +148,7 @@ class SpringEffect : public Effect {
   }
   void write(const Scene& scene, files::Writer& out) const override {
     for (const Spring& spring : scene.springs) {
+      if (spring.cable) continue;
       out.item("spring");
       out.field("name", spring.name);
       out.raw("bodies", files::two_names(scene, spring.first, spring.second));
@@ -166,11 +159,15 @@ class SpringEffect : public Effect {
     }
   }
   void check(const Scene& scene, files::Report& report) const override {
-    files::check_connections(scene, scene.springs, "spring", report);
+    std::vector<Spring> springs;
+    for (const Spring& each : scene.springs)
+      if (!each.cable) springs.push_back(each);
+    files::check_connections(scene, springs, "spring", report);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     int springs = 0, dampers = 0;
     for (const Spring& each : scene.springs) {
+      if (each.cable) continue;
       springs += pulls(each);
       dampers += damps(each);
     }
@@ -205,7 +202,7 @@ class SpringEffect : public Effect {
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Spring& spring : momenta.scene.springs) {
-      if (!momenta.holds_outside(spring.first, spring.second)) continue;
+      if (spring.cable || !momenta.holds_outside(spring.first, spring.second)) continue;
       const std::string what = "spring \"" + spring.name + "\"";
       momenta.push(what);
       const bool second = momenta.is_outside(spring.second);
@@ -219,7 +216,9 @@ class SpringEffect : public Effect {
     return false;
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    if (scene.springs.empty()) return nullptr;
+    if (std::all_of(scene.springs.begin(), scene.springs.end(),
+                    [](const Spring& each) { return each.cable.has_value(); }))
+      return nullptr;
     return std::make_unique<SpringForces>(scene.springs, bodies);
   }
 };

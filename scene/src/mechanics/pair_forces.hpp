@@ -5,6 +5,40 @@
 
 namespace tether::scene::mechanics {
 
+/// Adds the wrench on a body to the loads.
+inline void put_wrench(const Bodies& bodies, int body, const Wrench<double>& wrench,
+                       std::vector<Load6>& loads) {
+  const int slot = bodies.inertia[at(body)].slot;
+  if (slot < 0) return;
+  loads[at(slot)].force += wrench.force;
+  loads[at(slot)].torque_world += wrench.torque;
+}
+/// Adds minus the derivatives of the wrench on a body of the pair `first`, `second`.
+inline void put_wrench(const Bodies& bodies, int first, int second, int body,
+                       const Frame<Dual>& frame, const Wrench<Dual>& wrench, JacobianBlocks& J) {
+  const int slot = bodies.inertia[at(body)].slot;
+  if (slot < 0) return;
+  const Vector3<Dual> torque = transposed_times(frame.R, wrench.torque);
+  for (int i = 0; i < 6; ++i) {
+    const Derivatives& d = (i < 3 ? wrench.force[i] : torque[i - 3]).derivatives();
+    const int row = J.motion_row(slot, i);
+    if (bodies.moves(first)) J.add_directions(row, bodies.inertia[at(first)].slot, d, 0, -1.0);
+    if (bodies.moves(second))
+      J.add_directions(row, bodies.inertia[at(second)].slot, d, kBodyDirections, -1.0);
+  }
+}
+/// Adds the gradient of the potential of the wrench on a body to a row of y.
+inline void put_gradient(const Bodies& bodies, int body, const Wrench<double>& wrench,
+                         double* row) {
+  const int slot = bodies.inertia[at(body)].slot;
+  if (slot < 0) return;
+  const Frame<double>& f = bodies.frames[at(body)];
+  for (int k = 0; k < 3; ++k) row[kBody * slot + k] -= wrench.force[k];
+  const Eigen::RowVector4d q =
+      (f.R.transpose() * wrench.torque).transpose() * bodies.turns[at(slot)];
+  for (int k = 0; k < 4; ++k) row[kBody * slot + kQuaternion + k] -= q[k];
+}
+
 /// Values and derivatives of the forces of items from one formula. An Item has
 ///
 ///   first, second                indices of its bodies in Bodies
@@ -19,16 +53,16 @@ class PairForces : public Force {
   void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
     for (const Item& each : items_) {
       const auto [a, b] = pair_of<double>(bodies.time, each, frame_pair(bodies, each), true);
-      put(bodies, each.first, a, loads);
-      put(bodies, each.second, b, loads);
+      put_wrench(bodies, each.first, a, loads);
+      put_wrench(bodies, each.second, b, loads);
     }
   }
   void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Item& each : items_) {
       const auto frames = seed_pair(bodies, each);
       const auto [a, b] = pair_of<Dual>(bodies.time, each, frames, true);
-      put(bodies, each, each.first, frames.first, a, J);
-      put(bodies, each, each.second, frames.second, b, J);
+      put_wrench(bodies, each.first, each.second, each.first, frames.first, a, J);
+      put_wrench(bodies, each.first, each.second, each.second, frames.second, b, J);
     }
   }
   double potential(const Bodies& bodies) const override {
@@ -41,8 +75,8 @@ class PairForces : public Force {
   void add_potential_gradient(const Bodies& bodies, double* row) const override {
     for (const Item& each : items_) {
       const auto [a, b] = pair_of<double>(bodies.time, each, frame_pair(bodies, each), false);
-      gradient(bodies, each.first, a, row);
-      gradient(bodies, each.second, b, row);
+      put_gradient(bodies, each.first, a, row);
+      put_gradient(bodies, each.second, b, row);
     }
   }
   bool has_power() const override { return works_; }
@@ -91,37 +125,6 @@ class PairForces : public Force {
     return {seed(bodies.frames[at(each.first)], bodies.moves(each.first), 0),
             seed(bodies.frames[at(each.second)], bodies.moves(each.second), kBodyDirections)};
   }
-  static void put(const Bodies& bodies, int body, const Wrench<double>& wrench,
-                  std::vector<Load6>& loads) {
-    const int slot = bodies.inertia[at(body)].slot;
-    if (slot < 0) return;
-    loads[at(slot)].force += wrench.force;
-    loads[at(slot)].torque_world += wrench.torque;
-  }
-  static void put(const Bodies& bodies, const Item& each, int body, const Frame<Dual>& frame,
-                  const Wrench<Dual>& wrench, JacobianBlocks& J) {
-    const int slot = bodies.inertia[at(body)].slot;
-    if (slot < 0) return;
-    const Vector3<Dual> torque = transposed_times(frame.R, wrench.torque);
-    for (int i = 0; i < 6; ++i) {
-      const Derivatives& d = (i < 3 ? wrench.force[i] : torque[i - 3]).derivatives();
-      const int row = J.motion_row(slot, i);
-      if (bodies.moves(each.first))
-        J.add_directions(row, bodies.inertia[at(each.first)].slot, d, 0, -1.0);
-      if (bodies.moves(each.second))
-        J.add_directions(row, bodies.inertia[at(each.second)].slot, d, kBodyDirections, -1.0);
-    }
-  }
-  static void gradient(const Bodies& bodies, int body, const Wrench<double>& wrench, double* row) {
-    const int slot = bodies.inertia[at(body)].slot;
-    if (slot < 0) return;
-    const Frame<double>& f = bodies.frames[at(body)];
-    for (int k = 0; k < 3; ++k) row[kBody * slot + k] -= wrench.force[k];
-    const Eigen::RowVector4d q =
-        (f.R.transpose() * wrench.torque).transpose() * bodies.turns[at(slot)];
-    for (int k = 0; k < 4; ++k) row[kBody * slot + kQuaternion + k] -= q[k];
-  }
-
   std::vector<Item> items_;
   bool works_ = false;
 };

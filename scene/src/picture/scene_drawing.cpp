@@ -295,6 +295,14 @@ class Drawing {
                  {"#808080", 1, "8 3 2 3"});
   }
 
+  void draw_cable(const Vector2d& from, const Cable& cable, const Vector2d& to) {
+    std::vector<Vector2d> points = {from};
+    for (const Ring& ring : cable.rings)
+      points.push_back(view_.pixel(carried(scene_, last_, ring.body, ring.at)));
+    points.push_back(to);
+    canvas_.path(points, kDark);
+  }
+
   void draw_spring(const Spring& spring) {
     if ((spring.first >= 0 && !is_drawn(spring.first)) ||
         (spring.second >= 0 && !is_drawn(spring.second)))
@@ -302,6 +310,7 @@ class Drawing {
     const Vector2d from = view_.pixel(carried(scene_, last_, spring.first, spring.at)),
                    to = view_.pixel(carried(scene_, last_, spring.second, spring.at_second));
     const double length = (to - from).norm();
+    if (spring.cable) return draw_cable(from, *spring.cable, to);
     if (!(length > 1)) return;
     const Vector2d along = (to - from) / length, across(-along.y(), along.x());
     const double straight = std::min(8.0, 0.15 * length);
@@ -435,6 +444,9 @@ View::View(const Scene& scene, const std::vector<const Poses*>& motion, const Bo
   for (const Spring& spring : scene.springs) {
     if (spring.first < 0) take(spring.at, 0);
     if (spring.second < 0) take(spring.at_second, 0);
+    if (spring.cable)
+      for (const Ring& ring : spring.cable->rings)
+        if (ring.body < 0) take(ring.at, 0);
   }
   if (low.x() > high.x()) low = {-1, -1}, high = {1, 1};
   middle_ = (low + high) / 2;

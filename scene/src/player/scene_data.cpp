@@ -94,9 +94,15 @@ Json joint_entry(const Scene& scene, const Joint& joint, const View& view) {
 }
 
 Json spring_entry(const Scene& scene, const Spring& spring, const View& view) {
-  return {{"name", spring.name},
-          {"first", anchor(scene, spring.first, spring.at, view)},
-          {"second", anchor(scene, spring.second, spring.at_second, view)}};
+  Json out = {{"name", spring.name},
+              {"first", anchor(scene, spring.first, spring.at, view)},
+              {"second", anchor(scene, spring.second, spring.at_second, view)}};
+  if (!spring.cable) return out;
+  Json rings = Json::array();
+  for (const Ring& ring : spring.cable->rings)
+    rings.push_back(anchor(scene, ring.body, ring.at, view));
+  out["rings"] = rings;
+  return out;
 }
 
 Json part_entry(const Shape& shape, const View& view, Forms& forms) {

@@ -92,6 +92,8 @@ inline Scene seen_from(const Eigen::Vector3d& origin, Scene scene) {
   for (Spring& spring : scene.springs) {
     spring.at -= origin;
     spring.at_second -= origin;
+    if (spring.cable)
+      for (Ring& ring : spring.cable->rings) ring.at -= origin;
   }
   for (CentralGravity& each : scene.central_gravity) each.at -= origin;
   return scene;

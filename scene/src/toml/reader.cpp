@@ -17,24 +17,38 @@ int Reader::body(Fields& in, std::string_view key) const {
   return 0;
 }
 
-void Reader::two_bodies(Fields& in, int& first, int& second) const {
+std::vector<int> Reader::several_bodies(Fields& in, std::size_t least, std::size_t most,
+                                        const char* allowed) const {
   const Value* value = in.find("bodies");
-  constexpr const char* kAllowed = "two names of bodies; \"world\" is the ground";
-  if (value == nullptr) return in.missing("bodies", kAllowed);
-  if (value->kind() != Value::Kind::array || value->items().size() != 2)
-    return in.wrong("bodies", std::string("must be ") + kAllowed);
-  int* const out[] = {&first, &second};
-  for (std::size_t i = 0; i < 2; ++i) {
-    const Value& name = value->items()[i];
-    if (name.kind() != Value::Kind::text)
-      return in.wrong("bodies", std::string("must be ") + kAllowed);
-    if (name.text() == "world") continue;
-    const auto found = bodies.find(name.text());
-    if (found == bodies.end())
-      return in.wrong("bodies", fmt::format("there is no body \"{}\"{}", name.text(),
-                                            hint_of(name.text(), scene.bodies)));
-    *out[i] = found->second;
+  if (value == nullptr) {
+    in.missing("bodies", allowed);
+    return {};
   }
+  const auto wrong = [&](std::string why) {
+    in.wrong("bodies", std::move(why));
+    return std::vector<int>{};
+  };
+  if (value->kind() != Value::Kind::array || value->items().size() < least ||
+      value->items().size() > most)
+    return wrong(std::string("must be ") + allowed);
+  std::vector<int> out;
+  for (const Value& name : value->items()) {
+    if (name.kind() != Value::Kind::text) return wrong(std::string("must be ") + allowed);
+    const auto found = bodies.find(name.text());
+    if (name.text() != "world" && found == bodies.end())
+      return wrong(fmt::format("there is no body \"{}\"{}", name.text(),
+                               hint_of(name.text(), scene.bodies)));
+    out.push_back(name.text() == "world" ? -1 : found->second);
+  }
+  return out;
+}
+
+void Reader::two_bodies(Fields& in, int& first, int& second) const {
+  const std::vector<int> both =
+      several_bodies(in, 2, 2, "two names of bodies; \"world\" is the ground");
+  if (both.empty()) return;
+  first = both[0];
+  second = both[1];
   if (first == second) in.wrong("bodies", "must be two different bodies");
 }
 

@@ -47,6 +47,9 @@ struct Reader {
 
   /// The body that `key` names.
   int body(Fields& in, std::string_view key) const;
+  /// bodies = ["a", "world", ...], `least` to `most`, -1 being the world; empty where it is wrong.
+  std::vector<int> several_bodies(Fields& in, std::size_t least, std::size_t most,
+                                  const char* allowed) const;
   /// bodies = ["a", "world"]
   void two_bodies(Fields& in, int& first, int& second) const;
 

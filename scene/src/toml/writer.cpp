@@ -61,12 +61,17 @@ void Writer::raw(std::string_view key, const std::string& value, std::string_vie
   text_ += '\n';
 }
 
+std::string names(const Scene& scene, const std::vector<int>& bodies) {
+  std::string text;
+  for (const int body : bodies)
+    text +=
+        (text.empty() ? "" : ", ") +
+        toml(body < 0 ? std::string("world") : scene.bodies[static_cast<std::size_t>(body)].name);
+  return "[" + text + "]";
+}
+
 std::string two_names(const Scene& scene, int first, int second) {
-  const auto name = [&](int body) {
-    return toml(body < 0 ? std::string("world")
-                         : scene.bodies[static_cast<std::size_t>(body)].name);
-  };
-  return fmt::format("[{}, {}]", name(first), name(second));
+  return names(scene, {first, second});
 }
 
 }  // namespace tether::scene::files

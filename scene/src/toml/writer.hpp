@@ -40,7 +40,8 @@ class Writer {
   std::string text_;
 };
 
-/// The names of two bodies, -1 being the world: ["a", "world"]
+/// The names of bodies, -1 being the world: ["a", "world"]
+std::string names(const Scene& scene, const std::vector<int>& bodies);
 std::string two_names(const Scene& scene, int first, int second);
 
 }  // namespace tether::scene::files

@@ -66,7 +66,20 @@ struct Pair {
   double rolling = 0, torsional = 0;  ///< m: moments over the normal force
 };
 
-/// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points.
+/// A frictionless ring or small pulley on a cable.
+struct Ring {
+  int body = -1;                                 ///< index, -1 the world
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< world coordinates at t = 0, m
+};
+
+/// A spring that does not push, through rings.
+struct Cable {
+  std::vector<Ring> rings;  ///< from the first end to the second
+  double winch = 0;         ///< the rest grows by it, m/s
+};
+
+/// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points. A cable has the sum
+/// of the distances along its rings as |d|, and neither pushes nor damps while it is slack.
 struct Spring {
   std::string name;             ///< for messages and expectations
   int first = -1, second = -1;  ///< indices of bodies, -1 the world
@@ -74,6 +87,7 @@ struct Spring {
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();
   double stiffness = 0, damping = 0;  ///< N/m, N s/m
   std::optional<double> rest;         ///< m; default the distance at t = 0
+  std::optional<Cable> cable = {};    ///< absent: a spring between its ends
   Place place;                        ///< in the file
 };
 

@@ -140,6 +140,11 @@ class Shapes {
   }
   addSpring(spring) {
     const from = this.place(spring.first), end = this.place(spring.second);
+    if (spring.rings) {
+      const points = [from, ...spring.rings.map(each => this.place(each)), end];
+      for (let k = 1; k < points.length; ++k) this.addRod(this.solid, points[k - 1], points[k], 0.3 * this.marker, kSpring);
+      return;
+    }
     const along = unit(subtract(end, from)), across = unit(crossed(along, Math.abs(along[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]));
     const turns = 10, width = 2.2 * this.marker;
     let last = from;

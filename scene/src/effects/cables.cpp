@@ -1,0 +1,438 @@
+// Tether: cables through rings. SPDX-License-Identifier: BSD-3-Clause
+//
+// With L the sum of the distances from point to point, and s = L - rest - winch t:
+//
+//   tension T = max(0, k s + c ds/dt) where s > 0, else 0; the same all along the cable,
+//   potential k s^2 / 2 where s > 0,
+//   power -(T - k s) dL/dt - k s winch of what has no potential
+#include "mechanics/effect.hpp"
+#include "mechanics/pair_forces.hpp"
+#include "tension.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+struct CablePoint {
+  int body;
+  Vector3d at;  // in its axes
+};
+
+/// A piece of a cable between two of its points.
+template <class S>
+struct Piece {
+  Vector3<S> from, to, along;
+  S length, rate;
+
+  Piece(const Frame<S>& A, const Vector3d& in_a, const Frame<S>& B, const Vector3d& in_b)
+      : length(0.0), rate(0.0) {
+    using std::sqrt;
+    const Jet<S> a = point<1>(A, in_a), b = point<1>(B, in_b);
+    from = a.x;
+    to = b.x;
+    along = b.x - a.x;
+    const S square = dot(along, along);
+    // Points that coincide have no direction, and the cable has none to pull in there.
+    if (!(square > 0.0)) {
+      along = Vector3<S>(S(0.0), S(0.0), S(0.0));
+      return;
+    }
+    length = sqrt(square);
+    for (int i = 0; i < 3; ++i) along[i] /= length;
+    const Vector3<S> relative = b.x1 - a.x1;
+    rate = dot(along, relative);
+  }
+  /// Adds the loads of the tension T on both bodies.
+  void pull(const Frame<S>& A, const Frame<S>& B, double T, Wrench<S>& on_a,
+            Wrench<S>& on_b) const {
+    Vector3<S> force = along;
+    for (int i = 0; i < 3; ++i) force[i] *= T;
+    on_a.add(A, from, force);
+    on_b.add(B, to, Vector3<S>(-force));
+  }
+};
+
+struct CableItem {
+  std::size_t index;  // of the scene's springs
+  std::vector<CablePoint> points;
+  double stiffness, damping, rest, winch;
+};
+
+/// The tension and its derivatives to length and rate.
+struct CableTension {
+  double elastic = 0, tension = 0, stretch = 0, by_length = 0, by_rate = 0, elastic_by_length = 0;
+
+  CableTension(const CableItem& of, double time, double length, double rate) {
+    stretch = length - of.rest - of.winch * time;
+    if (!(stretch > 0)) return;
+    elastic = of.stiffness * stretch;
+    elastic_by_length = of.stiffness;
+    tension = elastic + of.damping * (rate - of.winch);
+    if (tension > 0) {
+      by_length = of.stiffness;
+      by_rate = of.damping;
+    } else {
+      tension = 0;
+    }
+  }
+};
+
+class CableForces : public Force {
+ public:
+  CableForces(const Scene& scene, const Bodies& bodies) {
+    for (std::size_t i = 0; i < scene.springs.size(); ++i) {
+      const Spring& each = scene.springs[i];
+      if (!each.cable) continue;
+      CableItem item{i, {}, each.stiffness, each.damping, 0, each.cable->winch};
+      const auto add_point = [&](int body, const Vector3d& where) {
+        const int index = bodies.index(body);
+        item.points.push_back({index, point_in(bodies.frames[at(index)], where)});
+      };
+      add_point(each.first, each.at);
+      for (const Ring& ring : each.cable->rings) add_point(ring.body, ring.at);
+      add_point(each.second, each.at_second);
+      item.rest = each.rest ? *each.rest : measured(bodies, item).first;
+      works_ = works_ || item.damping > 0 || item.winch != 0;
+      items_.push_back(std::move(item));
+    }
+  }
+  const char* name() const override { return "cables"; }
+
+  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
+    for (const CableItem& each : items_) {
+      const double T = tension(bodies, each).tension;
+      each_wrench(bodies, each, T, [&](int body, const Wrench<double>& wrench) {
+        put_wrench(bodies, body, wrench, loads);
+      });
+    }
+  }
+  // T d(along) of each piece, and along dT, which depends on all points.
+  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const CableItem& each : items_) {
+      const Slopes slopes = slopes_of(bodies, each);
+      const CableTension now = tension(bodies, each);
+      for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
+        const auto [A, B] = seed_piece(bodies, each, k);
+        const Piece<Dual> piece(A, each.points[k].at, B, each.points[k + 1].at);
+        Wrench<Dual> a = no_wrench<Dual>(), b = a;
+        piece.pull(A, B, now.tension, a, b);
+        const int first = each.points[k].body, second = each.points[k + 1].body;
+        put_wrench(bodies, first, second, first, A, a, J);
+        put_wrench(bodies, first, second, second, B, b, J);
+      }
+      each_wrench(bodies, each, 1, [&](int body, const Wrench<double>& unit) {
+        if (!bodies.moves(body)) return;
+        const Vector3d torque = bodies.frames[at(body)].R.transpose() * unit.torque;
+        for (int i = 0; i < 6; ++i)
+          add_slopes(
+              bodies, each, J.motion_row(bodies.inertia[at(body)].slot, i),
+              i < 3 ? -unit.force[i] : -torque[i - 3], J, [&](std::size_t p) {
+                return Derivatives(now.by_length * slopes.length[p] + now.by_rate * slopes.rate[p]);
+              });
+      });
+    }
+  }
+  double potential(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const CableItem& each : items_) {
+      const CableTension now(each, bodies.time + bodies.span, measured(bodies, each).first, 0);
+      sum += 0.5 * now.elastic * std::max(0.0, now.stretch);
+    }
+    return sum;
+  }
+  void add_potential_gradient(const Bodies& bodies, double* row) const override {
+    for (const CableItem& each : items_)
+      each_wrench(
+          bodies, each, tension(bodies, each).elastic,
+          [&](int body, const Wrench<double>& wrench) { put_gradient(bodies, body, wrench, row); });
+  }
+  bool has_power() const override { return works_; }
+  double power(const Bodies& bodies) const override {
+    double sum = 0;
+    for (const CableItem& each : items_) {
+      const double rate = measured(bodies, each).second;
+      const CableTension now = tension(bodies, each);
+      sum -= (now.tension - now.elastic) * rate + now.elastic * each.winch;
+    }
+    return sum;
+  }
+  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
+    for (const CableItem& each : items_) {
+      const Slopes slopes = slopes_of(bodies, each);
+      const double rate = measured(bodies, each).second;
+      const CableTension now = tension(bodies, each);
+      const double by_length =
+          (now.by_length - now.elastic_by_length) * rate + now.elastic_by_length * each.winch;
+      const double by_rate = now.by_rate * rate + now.tension - now.elastic;
+      add_slopes(bodies, each, J.work_row, 1, J, [&](std::size_t p) {
+        return Derivatives(by_length * slopes.length[p] + by_rate * slopes.rate[p]);
+      });
+    }
+  }
+  void report(const Bodies& bodies, Forces& forces) const override {
+    for (const CableItem& each : items_) {
+      const CablePoint &a = each.points.front(), &b = each.points.back();
+      report_tension(each.index,
+                     {tension(bodies, each).tension, point<0>(bodies.frames[at(a.body)], a.at).x,
+                      point<0>(bodies.frames[at(b.body)], b.at).x},
+                     forces);
+    }
+  }
+  // |dL/dx| is at most 1 at an end and 2 at a ring, and adds up over the points of a body.
+  void check_step(const Scene& scene, const Bodies& bodies, double dt) const override {
+    for (const CableItem& each : items_) {
+      std::map<int, double> root;
+      for (std::size_t p = 0; p < each.points.size(); ++p)
+        root[each.points[p].body] +=
+            (p == 0 || p + 1 == each.points.size() ? 1 : 2) *
+            std::sqrt(softness(bodies, each.points[p].body, each.points[p].at));
+      double inverse = 0;
+      for (const auto& [body, sum] : root) inverse += sum * sum;
+      check_tension_step(scene, scene.springs[each.index], inverse, dt);
+    }
+  }
+  // As springs: what damps sees the velocities at the end of the last step.
+  void step(SteppedBodies& stepped, double dt) const override {
+    const Bodies& bodies = stepped.before_forces();
+    for (const CableItem& each : items_) {
+      const auto [length, rate] = measured(bodies, each);
+      const CableTension now(each, stepped.bodies().time, length, rate);
+      each_wrench(bodies, each, 1, [&](int body, const Wrench<double>& unit) {
+        stepped.push(body, dt, now.elastic * unit.force, now.elastic * unit.torque);
+        const double damps = now.tension - now.elastic;
+        stepped.damp(body, dt, damps * unit.force, damps * unit.torque);
+      });
+    }
+  }
+
+ private:
+  /// Derivatives of length and rate to the 12 directions of the body of each point, in front.
+  struct Slopes {
+    std::vector<Derivatives> length, rate;
+  };
+
+  static const Frame<double>& frame_of(const Bodies& bodies, const CableItem& each, std::size_t p) {
+    return bodies.frames[at(each.points[p].body)];
+  }
+  static Piece<double> piece_of(const Bodies& bodies, const CableItem& each, std::size_t k) {
+    return {frame_of(bodies, each, k), each.points[k].at, frame_of(bodies, each, k + 1),
+            each.points[k + 1].at};
+  }
+  static std::pair<Frame<Dual>, Frame<Dual>> seed_piece(const Bodies& bodies, const CableItem& each,
+                                                        std::size_t k) {
+    return {seed(frame_of(bodies, each, k), bodies.moves(each.points[k].body), 0),
+            seed(frame_of(bodies, each, k + 1), bodies.moves(each.points[k + 1].body),
+                 kBodyDirections)};
+  }
+  /// Length and rate.
+  static std::pair<double, double> measured(const Bodies& bodies, const CableItem& each) {
+    std::pair<double, double> sum(0.0, 0.0);
+    for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
+      const Piece<double> piece = piece_of(bodies, each, k);
+      sum.first += piece.length;
+      sum.second += piece.rate;
+    }
+    return sum;
+  }
+  static CableTension tension(const Bodies& bodies, const CableItem& each) {
+    const auto [length, rate] = measured(bodies, each);
+    return {each, bodies.time, length, rate};
+  }
+  /// The wrench on the body of each point in turn, both pieces together.
+  template <class Do>
+  static void each_wrench(const Bodies& bodies, const CableItem& each, double T, const Do& act) {
+    Wrench<double> left = no_wrench<double>();
+    for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
+      Wrench<double> right = no_wrench<double>();
+      piece_of(bodies, each, k)
+          .pull(frame_of(bodies, each, k), frame_of(bodies, each, k + 1), T, left, right);
+      act(each.points[k].body, left);
+      left = right;
+    }
+    act(each.points.back().body, left);
+  }
+  static Slopes slopes_of(const Bodies& bodies, const CableItem& each) {
+    Slopes out;
+    out.length.assign(each.points.size(), Derivatives::Zero());
+    out.rate = out.length;
+    const auto add_parts = [](const Dual& value, Derivatives& first, Derivatives& second) {
+      first.head<kBodyDirections>() += value.derivatives().head<kBodyDirections>();
+      second.head<kBodyDirections>() += value.derivatives().tail<kBodyDirections>();
+    };
+    for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
+      const auto [A, B] = seed_piece(bodies, each, k);
+      const Piece<Dual> piece(A, each.points[k].at, B, each.points[k + 1].at);
+      add_parts(piece.length, out.length[k], out.length[k + 1]);
+      add_parts(piece.rate, out.rate[k], out.rate[k + 1]);
+    }
+    return out;
+  }
+  template <class Of>
+  static void add_slopes(const Bodies& bodies, const CableItem& each, int row, double factor,
+                         JacobianBlocks& J, const Of& of) {
+    for (std::size_t p = 0; p < each.points.size(); ++p)
+      if (const int body = each.points[p].body; bodies.moves(body))
+        J.add_directions(row, bodies.inertia[at(body)].slot, of(p), 0, factor);
+  }
+
+  std::vector<CableItem> items_;
+  bool works_ = false;
+};
+
+/// Bodies and places of its ends and rings, in order.
+std::vector<Ring> cable_points(const Spring& spring) {
+  std::vector<Ring> all = spring.cable->rings;
+  all.insert(all.begin(), Ring{spring.first, spring.at});
+  all.push_back({spring.second, spring.at_second});
+  return all;
+}
+
+constexpr std::size_t kMostPoints = 1000;
+
+class CableEffect : public Effect {
+ public:
+  void read(files::Fields& root, files::Reader& r) const override {
+    r.each(root, "cable", [&](files::Fields& in) {
+      Spring spring;
+      spring.place = in.place();
+      spring.name = files::read_name(in, "cable");
+      Cable& cable = spring.cable.emplace();
+      const std::vector<int> bodies = r.several_bodies(
+          in, 2, kMostPoints, "names of bodies, one for each point; \"world\" is the ground");
+      if (!in.has("at")) in.missing("at", "points from end to end, world, m");
+      const std::vector<Vector3d> points = in.points("at", 2, kMostPoints);
+      if (!in.has("stiffness")) in.missing("stiffness", "a number > 0 (N/m)");
+      spring.stiffness = in.number("stiffness", 1, files::kPositive, "N/m");
+      spring.damping = in.number("damping", spring.damping, files::kNotNegative, "N s/m");
+      if (in.has("length")) spring.rest = in.number("length", 1, files::kPositive, "m");
+      cable.winch = in.number("winch", cable.winch, files::kAny, "m/s");
+      if (bodies.empty() || points.empty()) return;
+      if (bodies.size() != points.size())
+        return in.wrong("at",
+                        fmt::format("must be {} points, one for each of bodies", bodies.size()));
+      spring.first = bodies.front();
+      spring.at = points.front();
+      spring.second = bodies.back();
+      spring.at_second = points.back();
+      for (std::size_t k = 1; k + 1 < points.size(); ++k)
+        cable.rings.push_back({bodies[k], points[k]});
+      r.scene.springs.push_back(std::move(spring));
+    });
+  }
+  void write(const Scene& scene, files::Writer& out) const override {
+    for (const Spring& spring : scene.springs) {
+      if (!spring.cable) continue;
+      out.item("cable");
+      out.field("name", spring.name);
+      std::vector<int> bodies;
+      std::vector<Vector3d> points;
+      for (const Ring& each : cable_points(spring)) {
+        bodies.push_back(each.body);
+        points.push_back(each.at);
+      }
+      out.raw("bodies", files::names(scene, bodies));
+      out.raw("at", files::toml(points), "m");
+      out.field("stiffness", spring.stiffness, "N/m");
+      out.field("damping", spring.damping, "N s/m");
+      if (spring.rest) out.field("length", *spring.rest, "m");
+      out.field("winch", spring.cable->winch, "m/s");
+    }
+  }
+  void check(const Scene& scene, files::Report& report) const override {
+    std::set<std::string> names;
+    for (const Spring& each : scene.springs)
+      if (!each.cable) names.insert(each.name);
+    for (const Spring& each : scene.springs) {
+      if (!each.cable) continue;
+      const std::string path = fmt::format("cable \"{}\"", each.name);
+      if (!names.insert(each.name).second)
+        report.add(each.place, path + ": name", "", "another cable or spring has it already");
+      const std::vector<Ring> points = cable_points(each);
+      double length = 0;
+      bool apart = true, pulls = false;
+      for (std::size_t k = 0; k + 1 < points.size(); ++k) {
+        const double piece = (points[k + 1].at - points[k].at).norm();
+        length += piece;
+        apart = apart && piece > 0;
+        pulls = pulls || (points[k].body != points[k + 1].body &&
+                          (moves(scene, points[k].body) || moves(scene, points[k + 1].body)));
+      }
+      if (!apart)
+        report.add(each.place, path + ": at", "", "a point must not be where the one before is");
+      if (!pulls)
+        report.add(each.place, path + ": bodies", "",
+                   "a piece of it must join two bodies, one of which can move");
+      if (!(each.rest.value_or(length) + each.cable->winch * scene.end > 0))
+        report.add(each.place, path + ": winch", fmt::format("{}", each.cable->winch),
+                   fmt::format("leaves no length before the end, {} s", scene.end));
+    }
+  }
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    int cables = 0;
+    std::size_t rings = 0;
+    for (const Spring& each : scene.springs) {
+      cables += each.cable.has_value();
+      if (each.cable) rings += each.cable->rings.size();
+    }
+    if (cables == 0) return;
+    const std::string through = rings > 0 ? " through " + counted(rings, "ring") : "";
+    lines.push_back({"cables", counted(cables, "cable") + through});
+  }
+  void take_lengths(const Scene& scene, Largest& length) const override {
+    for (const Spring& spring : scene.springs) {
+      if (!spring.cable) continue;
+      for (const Ring& ring : spring.cable->rings) {
+        take_arm(scene, ring.body, ring.at, length);
+        length.take((ring.at - spring.at).norm());
+      }
+    }
+  }
+  void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
+    for (const Spring& spring : scene.springs)
+      if (spring.cable) rate.take(std::abs(spring.cable->winch) / length);
+  }
+  void convert(Scene& scene, const Units& units) const override {
+    for (Spring& spring : scene.springs) {
+      if (!spring.cable) continue;
+      for (Ring& ring : spring.cable->rings) ring.at /= units.length;
+      spring.cable->winch /= units.speed();
+    }
+  }
+  // Several points of the world pull in directions that change: no axis is left.
+  void limit_momenta(Momenta& momenta) const override {
+    for (const Spring& spring : momenta.scene.springs) {
+      if (!spring.cable) continue;
+      std::vector<Vector3d> outside;
+      for (const Ring& each : cable_points(spring))
+        if (momenta.is_outside(each.body)) outside.push_back(each.at);
+      if (outside.empty()) continue;
+      const std::string what = "cable \"" + spring.name + "\"";
+      momenta.push(what);
+      for (const Vector3d& each : outside)
+        momenta.force_through(each, 1e-12, what + " holds from outside");
+    }
+  }
+  bool does_work(const Scene& scene) const override {
+    for (const Spring& each : scene.springs)
+      if (each.cable && each.cable->winch != 0) return true;
+    return false;
+  }
+  std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
+    const bool any = std::any_of(scene.springs.begin(), scene.springs.end(),
+                                 [](const Spring& each) { return each.cable.has_value(); });
+    return any ? std::make_unique<CableForces>(scene, bodies) : nullptr;
+  }
+
+ private:
+  static bool moves(const Scene& scene, int body) {
+    return body >= 0 && !scene.bodies[at(body)].fixed;
+  }
+};
+
+}  // namespace
+
+TETHER_EFFECT(cables, CableEffect)
+
+}  // namespace tether::scene::effects
