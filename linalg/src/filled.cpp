@@ -64,7 +64,7 @@ bool FilledPlaces::list_all() {
 }
 
 // Known entries are zero while the others are looked at.
-void FilledPlaces::look_at_all(double* c) {
+void FilledPlaces::note_all(double* c) {
   const auto rows = static_cast<int>(counts_.size());
   bool any = !list_all();
   if (!any) {
@@ -77,7 +77,7 @@ void FilledPlaces::look_at_all(double* c) {
     any = any_filled(c, places_.size());
     for (std::size_t e = 0; e < listed; ++e) c[list_[e]] = lifted_[e];
   }
-  for (int i = 0; any && i < rows; ++i) look(i, c + static_cast<std::ptrdiff_t>(i) * n_);
+  for (int i = 0; any && i < rows; ++i) note(i, c + static_cast<std::ptrdiff_t>(i) * n_);
 }
 
 void FilledPlaces::clear_all(double* c) {

@@ -205,7 +205,7 @@ TEST_CASE("choice of the metric: looks at each of the first moves, then seldom")
 
 TEST_CASE("choice of the metric: the other one is taken where it halves the move and its answer") {
   MetricChoice choice;
-  const AnsweredMove stiff{0.1, 0.05};
+  const MoveAndResponse stiff{0.1, 0.05};
   CHECK_FALSE(choice.doubts({1e-5, 9e-5}));  // harms nobody
   REQUIRE(choice.doubts(stiff));
   CHECK_FALSE(choice.prefers({0.08, 0.0}, stiff));

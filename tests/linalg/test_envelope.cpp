@@ -136,11 +136,11 @@ TEST_CASE("filled places: of all rows at once as of each row by itself") {
     c[static_cast<std::size_t>(place(random))] = std::numeric_limits<double>::quiet_NaN();
     c[static_cast<std::size_t>(place(random))] = -0.0;
     const std::vector<double> before = c;
-    all.look_at_all(c.data());
+    all.note_all(c.data());
     CHECK(std::equal(c.begin(), c.end(), before.begin(),
                      [](double a, double b) { return a == b || (a != a && b != b); }));
     for (int i = 0; i < kRows; ++i) {
-      each.look(i, c.data() + i * kColumns);
+      each.note(i, c.data() + i * kColumns);
       REQUIRE(std::equal(all.begin(i), all.end(i), each.begin(i), each.end(i)));
     }
     if (round % 3 != 0) continue;

@@ -350,7 +350,7 @@ TEST_CASE(
       wide.setConstant(std::numeric_limits<double>::quiet_NaN());
       for (int i = 0; i < m; ++i)
         for (int j = 0; j < n; ++j) wide(i, columns[static_cast<std::size_t>(j)]) = c.C(i, j);
-      for (int i = 0; i < m; ++i) places.look(i, wide.row(i).data());
+      for (int i = 0; i < m; ++i) places.note(i, wide.row(i).data());
     };
     spread();
     REQUIRE(solver.factor(wide.data(), width, rows.data(), columns.data(), 1e-12));

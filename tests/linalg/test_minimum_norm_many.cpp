@@ -139,7 +139,7 @@ TEST_CASE("many rows: kept, in wider arrays, without allocation") {
   wide.middleCols(1, kColumns) = c.C;
   tether::linalg::FilledPlaces places;
   places.resize(kRows, kColumns + 3);
-  places.look_at_all(wide.data());
+  places.note_all(wide.data());
   MinimumNorm told(kRows, kColumns), untold(kRows, kColumns);
   Eigen::VectorXd dy(kColumns);
   const auto factor = [&](MinimumNorm& solver, const tether::linalg::FilledPlaces* known) {
@@ -172,11 +172,11 @@ TEST_CASE("many rows: kept, in wider arrays, without allocation") {
   // Rows that are thin are not kept; nor is what is no number.
   const Case thin = many_rows(true);
   wide.middleCols(1, kColumns) = thin.C;
-  places.look_at_all(wide.data());
+  places.note_all(wide.data());
   REQUIRE(factor(told, &places));
   REQUIRE(told.rank() == kIndependent + kThin);
   CHECK_FALSE(keep());
   wide(250, 250) = std::numeric_limits<double>::quiet_NaN();
-  places.look_at_all(wide.data());
+  places.note_all(wide.data());
   CHECK_FALSE(factor(told, &places));
 }

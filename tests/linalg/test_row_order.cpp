@@ -31,7 +31,7 @@ struct Chains {
       if (i < kRows - 1)
         entries[static_cast<std::size_t>(first)] = entries[static_cast<std::size_t>(first) + 1] =
             1.0;
-      places->look(i, entries.data());
+      places->note(i, entries.data());
     }
   }
 };

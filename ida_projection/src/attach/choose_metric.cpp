@@ -6,19 +6,19 @@
 namespace tether::ida_projection {
 
 // Is the metric free, and can the response of F be had?
-bool Projection::Impl::asks_for_metric() const {
+bool Projection::Impl::may_change_metric() const {
   return in_use(Mechanism::other_metric) && movers_.used->rows().traits.many &&
          movers_.used->rows().may_use_levels() && wanted_metric_ == Metric::automatic &&
          options_.group.empty() && options_.advanced.metric == Metric::local_correction &&
          movers_.used == movers_.own.get() && polish_.is_response_available();
 }
 
-// Moves to which stiff components answer excite them, and scales made of what they then do make
-// the next moves worse.
+// A move that disturbs stiff components makes them oscillate; the metric, built from those
+// oscillations, then makes worse moves.
 void Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
-  if (move.status != Status::success || !asks_for_metric() || !metric_choice_.due()) return;
-  AnsweredMove at{move.length, polish_.answer(candidate)};
-  if (at.answer < 0.0) return;
+  if (move.status != Status::success || !may_change_metric() || !metric_choice_.due()) return;
+  MoveAndResponse at{move.length, polish_.response_length(candidate)};
+  if (at.response < 0.0) return;
   if (metric_choice_.doubts(at)) at = try_other_metric(candidate, at, move);
   // Multipliers of index 2 answer to any move, by more than its length over h.
   if (metric_choice_.stiff(at) && variables_.high_index()) metric_choice_.pause();
@@ -31,8 +31,8 @@ Move Projection::Impl::move_by_levels(const Candidate& candidate, bool by_levels
   return movers_.used->move(candidate);
 }
 
-AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
-                                                const AnsweredMove& present, Move& move) {
+MoveAndResponse Projection::Impl::try_other_metric(const Candidate& candidate,
+                                                   const MoveAndResponse& present, Move& move) {
   const bool by_levels = metric_choice_.by_levels();
   if (!movers_.used->rows().use_levels(!by_levels)) {
     metric_choice_.found_none();
@@ -40,13 +40,13 @@ AnsweredMove Projection::Impl::try_other_metric(const Candidate& candidate,
   }
   const Move other = move_by_levels(candidate, !by_levels);
   const bool moved = other.status == Status::success && !other.capped;
-  const AnsweredMove its{other.length, moved ? polish_.answer(candidate) : -1.0};
-  if (its.answer >= 0.0 && metric_choice_.prefers(its, present)) {
+  const MoveAndResponse its{other.length, moved ? polish_.response_length(candidate) : -1.0};
+  if (its.response >= 0.0 && metric_choice_.prefers(its, present)) {
     move = other;
     if (in_use(Mechanism::expected_oscillations)) control_.expect_oscillations();
     return its;
   }
-  if (its.answer < 0.0) metric_choice_.found_none();
+  if (its.response < 0.0) metric_choice_.found_none();
   move = move_by_levels(candidate, by_levels);
   return present;
 }

@@ -303,7 +303,7 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
   }
   const int flag = IDASolve(ida_.mem(), tout, tret, yret, ypret, itask);
   if (flag < 0 || !movers_.used) return flag;
-  look_for_bypass();
+  check_for_bypass();
   if (watch_.bypass.steps() > 0) return flag;
   // A step that IDA returns as it is has been projected; what it interpolates has not.
   const Status of_step = report_.status;

@@ -110,7 +110,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (movers_.used != nullptr) movers_.used->rows().forget_failure();
   control_.restore_weights(weights, attempts_.steps);
   const bool asked = inquiry_.probe != Probe::none;
-  int flag = asked ? look_around(candidate) : step(candidate, tolerance, call_setup);
+  int flag = asked ? probe_candidate(candidate) : step(candidate, tolerance, call_setup);
   if (flag == 0 && !asked) choose_step(candidate);
   // Evaluations that only look around may fail, but what asks for the end of the run ends it.
   const bool ended =
@@ -120,7 +120,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
 }
 
 // For make_consistent, which wants no step.
-int Projection::Impl::look_around(Candidate& candidate) {
+int Projection::Impl::probe_candidate(Candidate& candidate) {
   N_VScale(1.0, candidate.weights, unknowns_.weights);
   if (!variables_.known()) derive_id(candidate);
   candidate.t = ida_.step().t;
@@ -166,7 +166,7 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
   if (const std::optional<int> ended = watch_rejections(candidate, step)) return *ended;
   Stopwatch stopwatch(*this);
   if (!run_.engaged) {
-    if (const std::optional<int> done = look_before_moving(candidate)) return *done;
+    if (const std::optional<int> done = measure_before_engaging(candidate)) return *done;
     stopwatch.start();
     const Status engaged = engage(candidate);
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
@@ -187,8 +187,8 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
   if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(candidate);
   account(move, step, stopwatch.running());
   if (move.status == Status::success) {
-    look_at_start(move);
-    look_for_doubts(candidate, step);
+    check_start(move);
+    check_for_doubts(candidate, step);
   }
   if (move.status == Status::not_converged)
     return finish(move.status, with_suspicion(movers_.used->message(), candidate));
@@ -197,7 +197,7 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
 
 // The corrector has found the candidate.
 void Projection::Impl::begin_move(Candidate& candidate, const StepData& step) {
-  if (!run_.linear_solver.known()) look_at_linear_solver();
+  if (!run_.linear_solver.known()) find_linear_solver_kind();
   account_for_previous_attempt(step);
   candidate.t = step.t;
   if (control_.starts_off_equations(attempts_.steps)) leave_out_of_error_test(false);
@@ -227,7 +227,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   choose_metric(candidate, moved);
   if (moved.status != Status::success) return moved;
   const bool polishes = before.made
-                            ? moved.length > polish_.longest_unanswered(control_.smoothing())
+                            ? moved.length > polish_.longest_without_response(control_.smoothing())
                             : wants_polish(moved.length);
   // A refinement: where F or the linear solver fails here, the move itself stands, unless the
   // failure is to end the run; then the corrector has kept it.
@@ -238,15 +238,17 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   return moved;
 }
 
-// The move takes back as well what an iteration before it has added: a solution less. Only where
-// F has no response: it would be left out, and IDA's test of algebraic variables needs it.
+// Polishing before the move saves one linear solve: the move removes what the polish violates. The
+// response of F to the move is then left out, so this is no choice where IDA's error test of
+// algebraic variables needs it.
 bool Projection::Impl::polishes_first() {
   if (!movers_.used->rows().traits.many) return false;
-  const double longest = std::min(kShortMove, polish_.longest_unanswered(control_.smoothing()));
+  const double longest =
+      std::min(kShortMove, polish_.longest_without_response(control_.smoothing()));
   if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||
       control_.tests_algebraic() || !movers_.used->rows().may_polish_first())
     return false;
-  const bool silent = metric_choice_.calm() || !asks_for_metric();
+  const bool silent = metric_choice_.calm() || !may_change_metric();
   return silent && wants_polish(0.0);
 }
 
@@ -270,7 +272,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   watch_.rejections.count(attempts_.moved > kPartInTest, attempts_.repeated, advances,
                           attempts_.steps);
   attempts_.moved = std::numeric_limits<double>::infinity();
-  if (!attempts_.repeated) control_.look_for_refusals(run_.engaged);
+  if (!attempts_.repeated) control_.count_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {
     attempts_.left_before = attempts_.left;
     movers_.used->rows().accept();

@@ -28,7 +28,7 @@ std::string Projection::Impl::with_suspicion(std::string text, const Candidate& 
 
 // From a start off the constraints moves do not shrink with the step. Above Options::largest_move
 // they are refused by name, below IDA's error test refuses them, with words of its own.
-void Projection::Impl::look_at_start(const Move& move) {
+void Projection::Impl::check_start(const Move& move) {
   if (attempts_.steps != 0) return;
   const double before = std::exchange(attempts_.first_move, move.length);
   const bool stays = attempts_.repeated && move.length > 1.0 && move.length > 0.5 * before;
@@ -41,13 +41,13 @@ void Projection::Impl::look_at_start(const Move& move) {
                    " tolerances off the constraints; call make_consistent first");
 }
 
-void Projection::Impl::look_for_doubts(const Candidate& candidate, const StepData& step) {
+void Projection::Impl::check_for_doubts(const Candidate& candidate, const StepData& step) {
   if (!FirstSteps::looks(attempts_.steps) || attempts_.repeated ||
       report_.warning() != Status::success || !in_use(Mechanism::false_row_watch))
     return;
   const std::string doubt =
-      watch_.first_steps.look(candidate, step, attempts_.steps, ida_.step_size(),
-                              polish_.corrected(), variables_, *movers_.used, corrector_);
+      watch_.first_steps.check(candidate, step, attempts_.steps, ida_.step_size(),
+                               polish_.corrected(), variables_, *movers_.used, corrector_);
   if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
   if (report_.advice.empty()) report_.advice = watch_.first_steps.idle_row();
 }

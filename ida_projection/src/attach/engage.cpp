@@ -16,8 +16,8 @@ namespace {
 // Multipliers of index 2: see method, section 7.
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
-constexpr int kFew = 16;                 // times as many unknowns as rows: rows_of_field()
-constexpr double kOnConstraints = 1e-8;  // tolerances; a shorter move is not worth making
+constexpr int kFew = 16;               // times as many unknowns as rows: rows_of_field()
+constexpr double kNeedsNoMove = 1e-8;  // tolerances; a shorter move is not worth making
 
 }  // namespace
 
@@ -28,8 +28,8 @@ bool Projection::Impl::rows_of_field() const {
   return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
 }
 
-void Projection::Impl::look_at_linear_solver() {
-  run_.linear_solver.look(ida_, attempts_.steps);
+void Projection::Impl::find_linear_solver_kind() {
+  run_.linear_solver.find(ida_, attempts_.steps);
   const bool iterative = run_.linear_solver.iterative();
   if (wanted_metric_ == Metric::automatic)
     options_.advanced.metric =
@@ -76,7 +76,7 @@ std::optional<int> Projection::Impl::engage_in_trouble(const Candidate& candidat
       !control_.in_trouble(attempts_.steps))
     return {};
   if (!variables_.known()) derive_id(candidate);
-  variables_.look_at_index(candidate, corrector_, ida_.step().cj, ida_.evaluations_for_jacobian());
+  variables_.find_index(candidate, corrector_, ida_.step().cj, ida_.evaluations_for_jacobian());
   if (!variables_.high_index() || !variables_.any()) return {};
   const Status engaged = engage(candidate);
   if (engaged == Status::success) return {};
@@ -117,14 +117,14 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
 
 // Until a first move is needed IDA is left alone, bit for bit: then this attempt is finished, and
 // the code for IDA is known.
-std::optional<int> Projection::Impl::look_before_moving(const Candidate& candidate) {
+std::optional<int> Projection::Impl::measure_before_engaging(const Candidate& candidate) {
   const Move first = movers_.used->measure(candidate);
   if (first.status != Status::success) {
     const int code = finish(first.status, movers_.used->message());
     // Before the first step a smaller step cannot cure rows that contradict each other.
     return attempts_.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
   }
-  if (first.length <= std::max(kOnConstraints, first.floor) && !control_.struggling()) {
+  if (first.length <= std::max(kNeedsNoMove, first.floor) && !control_.struggling()) {
     ++statistics_.skipped;
     statistics_.largest_drift_before =
         std::max(statistics_.largest_drift_before, first.drift_before);
@@ -140,7 +140,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   const double cj = ida_.step().cj;
   // Multipliers of higher index answer to a change of h by errors proportional to the change.
   if (options_.advanced.smooth_where_needed || (options_.suppress_algebraic && variables_.any()))
-    variables_.look_at_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
+    variables_.find_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
     variables_.note_index_as_low();
   leave_out_of_error_test(true);

@@ -133,11 +133,11 @@ class Projection::Impl {
   };
 
   void attach();
-  void look_for_bypass() { watch_.bypass.look(attempts_.steps, run_.initialized, report_); }
+  void check_for_bypass() { watch_.bypass.check(attempts_.steps, run_.initialized, report_); }
 
   // decorator.cpp: the stages of a projected step
   int step(Candidate& candidate, double tolerance, bool call_setup);
-  int look_around(Candidate& candidate);
+  int probe_candidate(Candidate& candidate);
   void choose_step(const Candidate& candidate);
   int correct(const Candidate& candidate, double tolerance, bool call_setup);
   void begin_move(Candidate& candidate, const StepData& step);
@@ -149,12 +149,12 @@ class Projection::Impl {
   void judge_capped(Move& move);
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
-  bool asks_for_metric() const;
+  bool may_change_metric() const;
   void account(const Move& move, const StepData& step, bool sampled);
   int finish(Status outcome, const std::string& text);
 
   // engage.cpp
-  void look_at_linear_solver();
+  void find_linear_solver_kind();
   bool rows_of_field() const;
   void derive_id(const Candidate& candidate);
   void leave_out_of_error_test(bool coupled);  ///< `coupled`: those of index 1 stay
@@ -163,13 +163,13 @@ class Projection::Impl {
   Care care_of_high_index(const Candidate& candidate) const;
   void begin_run(const Candidate& candidate);
   void quicken_vectors(const Candidate& candidate);
-  std::optional<int> look_before_moving(const Candidate& candidate);
+  std::optional<int> measure_before_engaging(const Candidate& candidate);
   Status engage(const Candidate& candidate);
 
   // doubts.cpp
   std::string with_suspicion(std::string text, const Candidate& candidate);
-  void look_at_start(const Move& move);
-  void look_for_doubts(const Candidate& candidate, const StepData& step);
+  void check_start(const Move& move);
+  void check_for_doubts(const Candidate& candidate, const StepData& step);
   void keep_point_before(const Candidate& candidate, OwnedVector& y);
   std::string undetermined_at(const Candidate& candidate, N_Vector y);
   std::string too_high_index() const;
@@ -180,8 +180,8 @@ class Projection::Impl {
   // choose_metric.cpp
   void choose_metric(const Candidate& candidate, Move& move);
   Move move_by_levels(const Candidate& candidate, bool by_levels);
-  AnsweredMove try_other_metric(const Candidate& candidate, const AnsweredMove& present,
-                                Move& move);
+  MoveAndResponse try_other_metric(const Candidate& candidate, const MoveAndResponse& present,
+                                   Move& move);
 
   // consistency.cpp
   struct JointStart;

@@ -92,7 +92,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) {
     polish_.allocate(like, unknowns_.contiguous);
-    polish_.may_foretell();
+    polish_.allow_forecasts();
     unknowns_.weights = OwnedVector(like);
     if (options_.id != nullptr) {
       variables_.set(options_.id);
@@ -128,7 +128,7 @@ void Projection::Impl::attach() {
   const StepData step = ida_.step();
   lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
     std::string ignored;
-    guarded([this] { return look_for_bypass(), 0; }, ignored);
+    guarded([this] { return check_for_bypass(), 0; }, ignored);
   });
   const int flag = IDASetNonlinearSolver(ida_.mem(), solver_.get());
   if (flag != 0)
@@ -137,18 +137,18 @@ void Projection::Impl::attach() {
 
 Projection::Impl::~Impl() {
   std::string ignored;
-  guarded([this] { return look_for_bypass(), 0; }, ignored);
+  guarded([this] { return check_for_bypass(), 0; }, ignored);
   Operations<Impl>::end(solver_.get(), options_.print);
   lifetime_.free_at_end(solver_.release());
 }
 
 Status Projection::Impl::status() {
-  look_for_bypass();
+  check_for_bypass();
   return watch_.bypass.steps() > 0 ? Status::never_called : report_.told();
 }
 
 const std::string& Projection::Impl::message() {
-  look_for_bypass();
+  check_for_bypass();
   return watch_.bypass.steps() > 0 ? watch_.bypass.text() : report_.text();
 }
 
@@ -176,7 +176,7 @@ std::string Projection::Impl::why_unlike_y(N_Vector v) const {
 }
 
 Statistics Projection::Impl::statistics() {
-  look_for_bypass();
+  check_for_bypass();
   Statistics s = statistics_;
   s.steps_without_plugin = watch_.bypass.steps();
   const long moved = s.projections - s.failures();

@@ -86,18 +86,18 @@ template <class Fill>
 int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries,
                      Fill&& fill) {
   const std::ptrdiff_t count = part.set->count;
-  const bool look_at_C = C != nullptr && !part.C_looked_at;
+  const bool check_jacobian_rows = C != nullptr && !part.C_looked_at;
   double* const to =
       g != nullptr ? part.g_room.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
   double* into = C;
-  if (look_at_C) {
+  if (check_jacobian_rows) {
     into = C_room_.begin(entries, entries + n);
     std::copy(C, C + entries, into);
   }
   const int flag = fill(to, into);
   if (g != nullptr && !part.g_room.end(g, count)) overrun_ = true;
-  if (look_at_C && !C_room_.end(C, entries)) overrun_ = true;
-  part.C_looked_at |= look_at_C;
+  if (check_jacobian_rows && !C_room_.end(C, entries)) overrun_ = true;
+  part.C_looked_at |= check_jacobian_rows;
   return overrun_ ? -1 : flag;
 }
 

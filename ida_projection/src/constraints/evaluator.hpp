@@ -60,7 +60,7 @@ class GuardedRoom {
   /// Place for `count` values, as they were written last; `more`: how many too many do no harm.
   double* begin(std::ptrdiff_t count, std::ptrdiff_t more) {
     reserve(count, more);
-    for (std::ptrdiff_t i = 0; i < kLookedAt; ++i) behind(count)[i] = kUnwritten;
+    for (std::ptrdiff_t i = 0; i < kChecked; ++i) behind(count)[i] = kUnwritten;
     return room_.data();
   }
   /// Copies them; false: more were written.
@@ -68,14 +68,14 @@ class GuardedRoom {
     if (room_.empty()) return true;  // there was no memory for it
     for (std::ptrdiff_t i = 0; i < count; ++i) values[i] = room_[static_cast<std::size_t>(i)];
     bool unwritten = true;
-    for (std::ptrdiff_t i = 0; i < kLookedAt; ++i)
+    for (std::ptrdiff_t i = 0; i < kChecked; ++i)
       unwritten = unwritten && behind(count)[i] == kUnwritten;
     return unwritten;
   }
 
  private:
   static constexpr double kUnwritten = 3.0517578125e-300;  // unlikely in g
-  static constexpr std::ptrdiff_t kLeast = 64, kLookedAt = 4;
+  static constexpr std::ptrdiff_t kLeast = 64, kChecked = 4;
   double* behind(std::ptrdiff_t count) { return room_.data() + count; }
   std::vector<double> room_;
 };

@@ -12,9 +12,9 @@ Corrector::Corrector(SUNNonlinearSolver solver, N_Vector like) : inner_(solver) 
 }
 
 bool Corrector::is_reached_by(const Ida& ida) {
-  heard_ = false;
+  reached_ = false;
   IDASetMaxNonlinIters(ida.mem(), maximum_iterations_);
-  return heard_;
+  return reached_;
 }
 
 int Corrector::initialize() {

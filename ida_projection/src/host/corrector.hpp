@@ -28,7 +28,7 @@ class Corrector {
   int set_convergence_test(SUNNonlinSolConvTestFn f, void* data);
   void set_maximum_iterations(int n) {
     maximum_iterations_ = n;
-    heard_ = true;
+    reached_ = true;
   }
   int maximum_iterations() const { return maximum_iterations_; }
   /// Does IDASetMaxNonlinIters arrive here?
@@ -73,7 +73,7 @@ class Corrector {
   bool has_setup_ =
       false;  // IDA's linear solver has factors, or a preconditioner, that can be renewed
   int maximum_iterations_ = 4;
-  bool heard_ = false;
+  bool reached_ = false;
   void* mem_ = nullptr;
   int stop_flag_ = 0;  // < 0: a callback ended the run in an evaluation of the plugin's own
   std::string stop_text_;

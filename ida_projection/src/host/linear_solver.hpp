@@ -11,7 +11,7 @@ namespace tether::ida_projection {
 class LinearSolverKind {
  public:
   /// After a correction; `steps`: accepted before it.
-  void look(const Ida& ida, long steps) {
+  void find(const Ida& ida, long steps) {
     long iterations = 0, preconditioners = 0, jacobians = 0;
     IDAGetNumLinIters(ida.mem(), &iterations);
     IDAGetNumPrecEvals(ida.mem(), &preconditioners);

@@ -23,7 +23,7 @@ void LocalMetric::reset() {
 }
 
 // s <- max(0.8 s, |correction|)
-void LocalMetric::look(const LoadedCandidate& at) {
+void LocalMetric::update_scale(const LoadedCandidate& at) {
   for (std::size_t i = 0; i < scale_.size(); ++i)
     trial_scale_[i] = std::max(kMetricDecay * scale_[i], std::abs(at.ycor[i]));
 }

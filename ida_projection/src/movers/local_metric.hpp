@@ -18,7 +18,7 @@ class LocalMetric {
         trial_scale_(static_cast<std::size_t>(size), 0.0) {}
 
   /// s with the present candidate, for accept(). Factors that are used again keep their D.
-  void look(const LoadedCandidate& at);
+  void update_scale(const LoadedCandidate& at);
   /// The same, and D of both blocks of rows: s or, where the error weights are asked for, WT.
   template <class Block>
   void fill(LoadedCandidate& at, Block& d, Block& a);

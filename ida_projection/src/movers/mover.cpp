@@ -15,14 +15,15 @@ constexpr double kNothing = 1e-8;      // tolerances: as good as no move
 constexpr double kLargestFloor = 0.1;  // tolerances
 constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
 // Factors of an earlier step leave at most so much for settle(), in tolerances.
-constexpr double kForLater = 0.1;
+constexpr double kLeftForSettle = 0.1;
 constexpr double kStaleRowsSafety = 4.0;  // by so much C of an earlier step may mislead
-constexpr int kLooks = 16;                // looks with the factors of one
-constexpr int kQuiet = 8;                 // moves that were none, then looks begin again
-constexpr int kQuick = 3;                 // moves with a whole C
+constexpr int kMostTests = 16;            // looks with the factors of one
+constexpr int kUnneededMoves = 8;         // moves that were none, then looks begin again
+constexpr int kUsualMoves = 3;            // moves with a whole C
 // This part of Options::tolerance is left where a move costs little beside the factors.
 constexpr double kCheapRest = 1e-4;
-constexpr double kSafe = 0.25;  // of Options::tolerance, where stale factors tell what is left
+constexpr double kStaleShare =
+    0.25;  // of Options::tolerance, where stale factors tell what is left
 // Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
 // moves would not be enough.
 constexpr double kWorn = 0.06, kSlow = 0.1;
@@ -83,26 +84,28 @@ double Mover::remaining_drift(const Candidate& candidate) {
 // Do C and the factors of an earlier look show that there is nothing to do? A run whose constraints
 // IDA keeps by itself looks at every step and finds rounding: g alone tells, while what its factors
 // make of it is far below the length at which moves begin.
-bool Mover::plainly_nothing() {
-  if (!in_use(Mechanism::looks) || !rows_->may_look() || looks_ >= kLooks) return false;
-  ++looks_;
+bool Mover::clearly_needs_no_move() {
+  if (!in_use(Mechanism::looks) || !rows_->may_test_with_factors() || tests_ >= kMostTests)
+    return false;
+  ++tests_;
   ++wear_.age;
-  return rows_->rounding_only() || kStaleRowsSafety * rows_->solve(Solve::look).length <= kNothing;
+  return rows_->rounding_only() || kStaleRowsSafety * rows_->solve(Solve::test).length <= kNothing;
 }
 
 Move Mover::measure(const Candidate& candidate) {
   Move result;
   if ((result.status = rows_->load(candidate, true)) != Status::success) return result;
-  const bool may_do = rows_->has_factors() && looks_ < kLooks;  // with g alone
+  const bool may_do = rows_->has_factors() && tests_ < kMostTests;  // with g alone
   result.status = rows_->value(candidate.t, !may_do);
   if (result.status != Status::success) return result;
   result.drift_before = result.drift_after = rows_->drift();
-  if (rows_->traits.gives_g && (result.drift_before == 0.0 || plainly_nothing())) return result;
-  looks_ = 0;
+  if (rows_->traits.gives_g && (result.drift_before == 0.0 || clearly_needs_no_move()))
+    return result;
+  tests_ = 0;
   if ((result.status = factor(candidate.t, true)) != Status::success) return result;
   if (rows_->rounding_only()) return result;
   Solution first = rows_->solve(Solve::first);
-  // That there is nothing to do the rows that an earlier look has kept tell as well.
+  // The rows kept by an earlier factorisation suffice to see that no move is needed.
   if (first.status == Status::success && !rows_->decided() && first.length > kNothing) {
     rows_->forget_rank();
     if ((result.status = factor(candidate.t, false)) != Status::success) return result;
@@ -118,11 +121,11 @@ Move Mover::measure(const Candidate& candidate) {
 
 // The same where moves have begun, after some that were none: rows that F contains, or that IDA
 // keeps by itself between the steps that need them.
-bool Mover::still_nothing(const Candidate& candidate, Move& result) {
-  if (!in_use(Mechanism::looks) || nothing_in_row_ < kQuiet) return false;
+bool Mover::needs_no_move_again(const Candidate& candidate, Move& result) {
+  if (!in_use(Mechanism::looks) || nothing_in_row_ < kUnneededMoves) return false;
   result.status = rows_->value(candidate.t, false);
   if (result.status != Status::success) return true;
-  result.looked = still_ = plainly_nothing();
+  result.looked = still_ = clearly_needs_no_move();
   if (!still_) return false;
   result.drift_before = result.drift_after = rows_->drift();
   move_length_ = 0.0;
@@ -135,18 +138,18 @@ Move Mover::move(const Candidate& candidate) {
   still_ = false;
   by_present_factors_ = -1.0;
   reused_ = rows_->keeps_factors() && rows_->has_factors();
-  result.status = rows_->load(candidate, !reused_ && nothing_in_row_ < kQuiet);
-  if (result.status != Status::success || still_nothing(candidate, result)) return result;
+  result.status = rows_->load(candidate, !reused_ && nothing_in_row_ < kUnneededMoves);
+  if (result.status != Status::success || needs_no_move_again(candidate, result)) return result;
   ++wear_.age;
   result.status = rows_->value(candidate.t, !reused_);
   if (result.status != Status::success) return result;
-  looks_ = 0;
+  tests_ = 0;
   newton(candidate, result);
   const bool nothing = result.status == Status::success && result.length <= kNothing;
   nothing_in_row_ = nothing && !rows_->keeps_factors() ? nothing_in_row_ + 1 : 0;
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
-  if (broken || result.moves > kQuick) rows_->look_again_soon();
+  if (broken || result.moves > kUsualMoves) rows_->refresh_pattern_soon();
   // Kept factors are in use only while dropped rows ask for less than that.
   if (result.status == Status::success && !result.capped && !reused_ && rows_->contradicts())
     result.status = Status::inconsistent;
@@ -178,7 +181,7 @@ void Mover::newton(const Candidate& candidate, Move& result) {
     by_present_factors_ = found.length;
     if (!rows_->traits.gives_g) break;
     if (reused_) {
-      if (2.0 * wear_.rate() * found.length <= kForLater) break;
+      if (2.0 * wear_.rate() * found.length <= kLeftForSettle) break;
       reused_ = false;
       renew = refill = true;
     } else {
@@ -251,21 +254,22 @@ bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, 
 
 Status Mover::settle(const Candidate& candidate, N_Vector change) {
   const double moved = rows_->shift(change);
-  if (rows_->keeps_factors()) return take_back(candidate, -1.0);
-  return take_rest(candidate, move_length_ + moved);
+  if (rows_->keeps_factors()) return remove_rest_with_kept_factors(candidate, -1.0);
+  return remove_rest(candidate, move_length_ + moved);
 }
 
 Status Mover::finish(const Candidate& candidate, bool polished) {
   if (still_ || !rows_->traits.gives_g) return Status::success;
   // Newton's method goes on where a move costs little beside the step.
-  if (rows_->traits.measures_rest) return take_rest(candidate, move_length_);
+  if (rows_->traits.measures_rest) return remove_rest(candidate, move_length_);
   if (!rows_->keeps_factors()) return Status::success;
-  const bool unseen = move_length_ > kSafe * options_.advanced.tolerance || !follows_;
-  return unseen ? take_back(candidate, polished ? by_present_factors_ : -1.0) : Status::success;
+  const bool unseen = move_length_ > kStaleShare * options_.advanced.tolerance || !follows_;
+  return unseen ? remove_rest_with_kept_factors(candidate, polished ? by_present_factors_ : -1.0)
+                : Status::success;
 }
 
 // With factors that belong to a point `reach` tolerances away.
-Status Mover::take_rest(const Candidate& candidate, double reach) {
+Status Mover::remove_rest(const Candidate& candidate, double reach) {
   const bool cheap = rows_->traits.measures_rest, measure = curvature_.due(reach, ++settles_);
   const double enough = (cheap ? kCheapRest : 1.0) * options_.advanced.tolerance;
   double previous = 0.0;
@@ -302,9 +306,9 @@ Status Mover::take_rest(const Candidate& candidate, double reach) {
 // others. Where too much is left, also of dropped rows, or a move is long, C is refactorised.
 // `previous`: length of the move before, by the same factors and with nothing in between; < 0:
 // there is none.
-Status Mover::take_back(const Candidate& candidate, double previous) {
+Status Mover::remove_rest_with_kept_factors(const Candidate& candidate, double previous) {
   const double floor = 1e2 * kEpsilon * rows_->size();
-  const double done = std::max(floor, kSafe * options_.advanced.tolerance);
+  const double done = std::max(floor, kStaleShare * options_.advanced.tolerance);
   for (int k = 0; k <= options_.advanced.maximum_iterations; ++k) {
     Status status = rows_->value(candidate.t, false);
     if (status != Status::success) return status;
@@ -329,8 +333,9 @@ Status Mover::take_back(const Candidate& candidate, double previous) {
     // The first of two moves may have been left less of than what remains then would be.
     const double leaves = k > 0 ? part : std::max(part, wear_.rate());
     const double length = found.length;
-    if (found.follows && (length <= done ||
-                          (part > 0.0 && leaves * length <= kSafe * options_.advanced.tolerance))) {
+    if (found.follows &&
+        (length <= done ||
+         (part > 0.0 && leaves * length <= kStaleShare * options_.advanced.tolerance))) {
       if (k > 0 && part > kWorn) rows_->forget_factors();
       return Status::success;
     }

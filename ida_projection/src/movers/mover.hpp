@@ -100,14 +100,14 @@ class Mover {
 
  private:
   Status factor(double t, bool refill);
-  bool plainly_nothing();
-  bool still_nothing(const Candidate& candidate, Move& result);
+  bool clearly_needs_no_move();
+  bool needs_no_move_again(const Candidate& candidate, Move& result);
   void newton(const Candidate& candidate, Move& result);
   bool allowed(const Candidate& candidate, Move& result);
   bool done(const Candidate& candidate, const Solution& solution, bool fresh, Move& result,
             Monitor::Verdict& verdict);
-  Status take_rest(const Candidate& candidate, double reach);
-  Status take_back(const Candidate& candidate, double previous);
+  Status remove_rest(const Candidate& candidate, double reach);
+  Status remove_rest_with_kept_factors(const Candidate& candidate, double previous);
 
   const Options& options_;
   Monitor monitor_;
@@ -118,7 +118,7 @@ class Mover {
   double by_present_factors_ = -1.0;
   bool reused_ = false;     // factors of an earlier step are in use for this one
   WearOfFactors wear_;      // of the current factors
-  int looks_ = 0;           // with the factors of an earlier candidate
+  int tests_ = 0;           // with the factors of an earlier candidate
   int nothing_in_row_ = 0;  // moves that were none
   bool still_ = false;      // the last candidate was only looked at
   Curvature curvature_;     // for what a polish moves

@@ -33,7 +33,7 @@ enum class Solve {
   again,    ///< the same rows as before
   rest,     ///< what a move or a polish has left
   closely,  ///< as closely as nearly dependent rows can be solved
-  look      ///< no move follows
+  test      ///< no move follows
 };
 
 /// g, C and its factors in one storage, for the candidate that was loaded last. Newton's loop asks
@@ -85,7 +85,7 @@ class RowsAt {
   /// May factors of a step serve the next ones, and do those at hand?
   virtual bool keeps_factors() const { return false; }
   /// May they tell that there is nothing to move?
-  virtual bool may_look() const { return has_factors(); }
+  virtual bool may_test_with_factors() const { return has_factors(); }
   /// Was it found out for this candidate which rows are independent?
   virtual bool decided() const { return true; }
   virtual void forget_rank() {}
@@ -94,7 +94,7 @@ class RowsAt {
   /// Rows that a solution leaves out contradict the others: `message` and `contradicting` say it.
   virtual bool contradicts() = 0;
   /// Moves were broken or many: perhaps for want of entries that g could not fill before.
-  virtual void look_again_soon() {}
+  virtual void refresh_pattern_soon() {}
 
   /// Which components are algebraic (1 differential, 0 algebraic; null: none), at a candidate.
   virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;

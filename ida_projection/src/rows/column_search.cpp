@@ -11,7 +11,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr std::size_t kMostAnswers = 20000000;  // rows of all groups: 80 MB
+constexpr std::size_t kMostProbes = 20000000;  // rows of all groups: 80 MB
 
 using linalg::at;
 
@@ -94,7 +94,7 @@ ColumnSearch::Outcome ColumnSearch::run(std::vector<char>* filled) {
     for (Group& group : groups_) {
       if (group.rows.empty()) continue;
       answers += group.rows.size();
-      if (answers > kMostAnswers) return Outcome::too_many_probes;
+      if (answers > kMostProbes) return Outcome::too_many_probes;
       if (group.end - group.begin == 1) {
         (*filled)[at(group.begin)] = 1;
         continue;

@@ -49,14 +49,14 @@ Status SplitRows<Solver>::find_seen(Evaluator& evaluator, double t, const std::v
     }
     if (status == Status::success) C_.notice_all();
   }
-  if (evaluator.uses_differences()) look_beyond(evaluator, t, y0.data(), WT.data());
+  if (evaluator.uses_differences()) extend_pattern(evaluator, t, y0.data(), WT.data());
   return Status::success;
 }
 
 // Columns that differences do not visit leave no entry in C.
 template <class Solver>
-void SplitRows<Solver>::look_beyond(Evaluator& evaluator, double t, const double* y,
-                                    const double* WT) {
+void SplitRows<Solver>::extend_pattern(Evaluator& evaluator, double t, const double* y,
+                                       const double* WT) {
   evaluator.sensitive(t, y, n_, WT, [this](int i, int j) { C_.notice(i, j); });
 }
 
@@ -196,7 +196,7 @@ Status SplitRows<Solver>::evaluate(Evaluator& evaluator, double t, const double*
     });
   });
   if (watched_.empty()) return status;
-  if (evaluator.uses_differences() && look_.due()) look_beyond(evaluator, t, y, WT);
+  if (evaluator.uses_differences() && refresh_.due()) extend_pattern(evaluator, t, y, WT);
   outgrown_ |= C_.notice(watched_);
   return status;
 }

@@ -17,7 +17,7 @@ namespace tether::ida_projection {
 
 /// When to look again which entries of C differences have to visit, that is, which ones g can fill
 /// by now: at the C evaluations number 16, 32, 64, ..., and with the next one after a failure.
-class LookAgain {
+class PatternRefresh {
  public:
   bool due() {
     if (++evaluations_ < next_) return false;
@@ -81,7 +81,7 @@ class SplitRows {
   bool outgrown() const { return outgrown_; }
   void rearrange();
   /// A move failed: perhaps for want of entries that g could not fill before.
-  void look_again_soon() { look_.soon(); }
+  void refresh_pattern_soon() { refresh_.soon(); }
   /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor();
   /// The same with the rows that the last factor() has kept. False: factor() is due.
@@ -134,7 +134,7 @@ class SplitRows {
 
   Status find_seen(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT);
-  void look_beyond(Evaluator& evaluator, double t, const double* y, const double* WT);
+  void extend_pattern(Evaluator& evaluator, double t, const double* y, const double* WT);
   void split();
   void watch();
   void set_up(Block& block, std::vector<int>* gather);
@@ -153,7 +153,7 @@ class SplitRows {
   std::vector<double> moved_;             // d.dy at its columns, 0 elsewhere; where B exists
   KindsOfUnknowns kinds_;
   std::vector<std::size_t> watched_;  // entries that would change the blocks, zero so far
-  LookAgain look_;
+  PatternRefresh refresh_;
   bool outgrown_ = false;
   bool structured_ = false;
   bool few_ = false;

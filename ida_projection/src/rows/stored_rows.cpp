@@ -57,7 +57,7 @@ Status StoredRows::evaluate_full(Evaluator& evaluator, double t, const double* y
   zero_elsewhere_ = false;
   const Status status = evaluator.jacobian_into_zeros(t, y, n_, WT, columns, values_.data(), g);
   if (!by_places_ || status != Status::success) return status;
-  places_.look_at_all(values_.data());
+  places_.note_all(values_.data());
   zero_elsewhere_ = by_places_ =
       kFewPlaces * static_cast<double>(places_.known()) <= static_cast<double>(values_.size());
   return status;

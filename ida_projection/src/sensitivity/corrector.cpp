@@ -239,7 +239,7 @@ Status SensitivityCorrector::factor(const Candidate& candidate, int k, bool firs
   if (first) {
     const Candidate own{candidate.t, vectors_of(candidate.base)[k],
                         vectors_of(candidate.correction)[k], vectors_of(candidate.weights)[k]};
-    metric.look(own, work_, spare_);
+    metric.update_scale(own, work_, spare_);
     metric.set(own, spare_);
   }
   const Status status = rows_->factor(metric.D());

@@ -57,7 +57,7 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
     return answered;
   };
   std::vector<char> filled;
-  constexpr long most = 4L * kLargestAsked;
+  constexpr long most = 4L * kLargestProbed;
   const auto search = [&](long probes) {
     return ColumnSearch(size, size, probe, probes).run(&filled);
   };

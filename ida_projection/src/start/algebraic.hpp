@@ -12,7 +12,7 @@
 namespace tether::ida_projection {
 
 /// Unknowns up to which F is asked about each of them.
-constexpr int kLargestAsked = 2000;
+constexpr int kLargestProbed = 2000;
 
 /// The id vector of IDA (1 differential, 0 algebraic), the caller's or derived from F, and whether
 /// F is of index 1 in its own variables.
@@ -34,7 +34,7 @@ class AlgebraicVariables {
 
   /// Finds out the index of F at the first call; it is a property of F, which later runs share.
   /// `usual`: evaluations of F that a Jacobian takes in this run, see index.cpp.
-  void look_at_index(const Candidate& candidate, Corrector& corrector, double cj, long usual);
+  void find_index(const Candidate& candidate, Corrector& corrector, double cj, long usual);
   void note_index_as_low() { index_known_ = true; }
   bool index_known() const { return index_known_; }
   /// F is not of index 1 in its own variables.
@@ -53,7 +53,7 @@ class AlgebraicVariables {
   const std::vector<int>& coupled() const { return coupled_; }
   void begin_run() { index_known_ = false; }
 
-  /// Doubts in the caller's id vector, after look_at_index(): variables that it calls algebraic
+  /// Doubts in the caller's id vector, after find_index(): variables that it calls algebraic
   /// although F contains their derivatives, or differential although F does not. Empty: none is
   /// known. Four evaluations of F at the first call, more where there are some.
   const std::string& doubts(const Candidate& candidate, Corrector& corrector, double cj);

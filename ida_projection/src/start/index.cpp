@@ -14,7 +14,7 @@ namespace {
 
 // Unknowns. Beyond the first size the look would be felt, except where each Jacobian of IDA takes
 // as many evaluations as there are unknowns, and dense factors: it costs two of these.
-constexpr int kLargestSize = 200, kLargestDense = kLargestAsked;
+constexpr int kLargestSize = 200, kLargestDense = kLargestProbed;
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
 }  // namespace
@@ -134,8 +134,8 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
   return !left.empty();
 }
 
-void AlgebraicVariables::look_at_index(const Candidate& candidate, Corrector& corrector, double cj,
-                                       long usual) {
+void AlgebraicVariables::find_index(const Candidate& candidate, Corrector& corrector, double cj,
+                                    long usual) {
   index_known_ = true;
   if (found_.known) return;
   found_.known = true;

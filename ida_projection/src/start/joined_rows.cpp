@@ -36,7 +36,7 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
   forget();  // of an attempt that failed
   if (candidate.base_entries == nullptr || !variables_.any() || !has_values(constraints_)) return;
   const auto size = static_cast<int>(N_VGetLength(candidate.base));
-  if (size > kLargestAsked) return;
+  if (size > kLargestProbed) return;
   const auto n = static_cast<std::size_t>(size);
   std::vector<double> y(n), WT(n);
   for (std::size_t j = 0; j < n; ++j) {

@@ -66,7 +66,8 @@ double AlgebraicTest::widened(const Variable& v, double weight, double y) const 
   return weight / (1.0 + weight * noise_ * error);
 }
 
-void AlgebraicTest::look(const Candidate& candidate, double move, int order, double h, long steps) {
+void AlgebraicTest::begin_attempt(const Candidate& candidate, double move, int order, double h,
+                                  long steps) {
   look_for_jump(h, steps);
   h_ = h;
   if (steps != steps_)

@@ -16,7 +16,7 @@ class AlgebraicTest {
   bool acts() const { return !variables_.empty(); }
   /// A new attempt, `steps` accepted before it: its order and step size, and the length of its
   /// move.
-  void look(const Candidate& candidate, double move, int order, double h, long steps);
+  void begin_attempt(const Candidate& candidate, double move, int order, double h, long steps);
   /// Do these variables keep IDA from a step of twice the size?
   bool limit_step() const;
   /// In the first step: has their error stayed where it was, though IDA has shortened the step?

@@ -30,19 +30,19 @@ double length(const double* w, double factor, const double* ycor, const double* 
 }  // namespace
 
 // The share of ycor in delta.
-double Foretold::share_of(N_Vector weights, N_Vector ycor, N_Vector delta) {
+double PolishForecast::share_of(N_Vector weights, N_Vector ycor, N_Vector delta) {
   N_VProd(ycor, weights, work_);
   const double square = N_VDotProd(work_, work_);
   N_VProd(work_, weights, work_);
   return square > 0.0 ? N_VDotProd(work_, delta) / square : 0.0;
 }
 
-void Foretold::doubt() {
+void PolishForecast::doubt() {
   wait_ = kWait;
   forget();
 }
 
-void Foretold::learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
+void PolishForecast::learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
   if (wait_ > 0) --wait_;
   const bool told = known(cj);
   if (told) {
@@ -59,7 +59,8 @@ void Foretold::learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj)
   not_stiff_ = N_VWrmsNorm(work_, weights) <= kNotStiff;
 }
 
-void Foretold::learn(const double* w, const double* ycor, const double* delta, int n, double cj) {
+void PolishForecast::learn(const double* w, const double* ycor, const double* delta, int n,
+                           double cj) {
   double* beyond = N_VGetArrayPointer(beyond_);
   if (wait_ > 0) --wait_;
   const bool told = known(cj);

@@ -7,7 +7,7 @@ namespace tether::ida_projection {
 
 /// Foretells what one more Newton iteration adds to a correction, from what earlier ones have
 /// added; in forms without algebraic variables. See foretold.cpp.
-class Foretold {
+class PolishForecast {
  public:
   /// Before the others; once.
   void allocate(N_Vector like) {

@@ -7,8 +7,8 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kFirstLooks = 16;  // in a row: a start excites what is stiff
-constexpr int kSeldom = 8, kLongestWait = 64;
+constexpr int kFirstMeasurements = 16;  // in a row: a start excites what is stiff
+constexpr int kPause = 8, kLongestWait = 64;
 constexpr double kPart = 0.1;    // of a move: so much is answered by what is not stiff
 constexpr double kHarm = 1e-4;   // tolerances: a shorter answer does none
 constexpr double kBetter = 0.5;  // of the length
@@ -20,11 +20,11 @@ bool MetricChoice::due() {
   return pause_ == 0;
 }
 
-bool MetricChoice::stiff(const AnsweredMove& at) const {
-  return at.answer > kPart * at.move && at.answer > kHarm;
+bool MetricChoice::stiff(const MoveAndResponse& at) const {
+  return at.response > kPart * at.move && at.response > kHarm;
 }
 
-bool MetricChoice::doubts(const AnsweredMove& at) {
+bool MetricChoice::doubts(const MoveAndResponse& at) {
   if (stiff(at)) return may_try();
   pause();
   calm_ = true;
@@ -33,14 +33,14 @@ bool MetricChoice::doubts(const AnsweredMove& at) {
 
 void MetricChoice::pause() {
   calm_ = false;
-  if (looks_ < kFirstLooks)
-    ++looks_;
+  if (measurements_ < kFirstMeasurements)
+    ++measurements_;
   else
-    pause_ = kSeldom;
+    pause_ = kPause;
 }
 
-bool MetricChoice::prefers(const AnsweredMove& other, const AnsweredMove& present) {
-  if (other.move + other.answer <= kBetter * (present.move + present.answer)) {
+bool MetricChoice::prefers(const MoveAndResponse& other, const MoveAndResponse& present) {
+  if (other.move + other.response <= kBetter * (present.move + present.response)) {
     by_levels_ = !by_levels_;
     return true;
   }

@@ -4,8 +4,8 @@
 namespace tether::ida_projection {
 
 /// A move and the response of F to it over the differential variables, in tolerances.
-struct AnsweredMove {
-  double move = 0.0, answer = 0.0;
+struct MoveAndResponse {
+  double move = 0.0, response = 0.0;
 };
 
 /// When to measure the response of F, and when to try the other metric (method, section 4).
@@ -17,11 +17,11 @@ class MetricChoice {
   /// Is no look due for the next move, since the last one found nothing?
   bool calm() const { return calm_ && pause_ > 1; }
   /// Do stiff components answer to it so much that it harms?
-  bool stiff(const AnsweredMove& at) const;
+  bool stiff(const MoveAndResponse& at) const;
   /// After a measurement: do they, and is it time to try the other metric?
-  bool doubts(const AnsweredMove& at);
+  bool doubts(const MoveAndResponse& at);
   /// After that trial: is the other one taken from now on?
-  bool prefers(const AnsweredMove& other, const AnsweredMove& present);
+  bool prefers(const MoveAndResponse& other, const MoveAndResponse& present);
   /// Is it time to try the other metric?
   bool may_try() { return wait_ == 0 || --wait_ == 0; }
   /// Nothing will be done about the answers: look again later.
@@ -33,7 +33,7 @@ class MetricChoice {
  private:
   static constexpr int kFirstWait = 2;
   bool by_levels_ = false, calm_ = false;
-  int looks_ = 0;               // that found nothing
+  int measurements_ = 0;        // that found nothing
   int pause_ = 0;               // moves until the next look
   int wait_ = 0;                // stiff answers until the next trial
   int next_wait_ = kFirstWait;  // after one that changed nothing

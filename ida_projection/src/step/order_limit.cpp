@@ -14,11 +14,11 @@ namespace {
 constexpr double kLogLarge = -0.36, kLogSmall = -1.2;  // of r: 0.7, 0.3
 constexpr double kLogLargeIfStiff = -0.6;              // 0.55
 constexpr int kSamples = 6, kSamplesAgain = 3;         // in the mean
-constexpr long kEarly = 10, kTrial = 40;         // steps with the limit; it is judged after them
-constexpr double kHopeless = 0.5, kWorth = 0.9;  // of the step before it
-constexpr double kPatience = 0.5;                // of these where vibrations are likely
-constexpr long kFirstSteps = 60;                 // steps: what is stiff is excited by a start
-constexpr long kFirstWait = 100;                 // steps, after a limit that did not pay
+constexpr long kEarly = 10, kTrial = 40;          // steps with the limit; it is judged after them
+constexpr double kStopBelow = 0.5, kWorth = 0.9;  // of the step before it
+constexpr double kPatience = 0.5;                 // of these where vibrations are likely
+constexpr long kFirstSteps = 60;                  // steps: what is stiff is excited by a start
+constexpr long kFirstWait = 100;                  // steps, after a limit that did not pay
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
 constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
@@ -146,7 +146,7 @@ void OrderLimit::judge(long steps, double t) {
   const double mean = std::abs(t - t_since_) / static_cast<double>(taken);
   // A vibration that a higher order excites, however long its steps are, grows.
   const double patience = stiff_ ? kPatience : 1.0;
-  if (mean < patience * (trials_ > 0 ? kWorth : kHopeless) * std::abs(step_before_))
+  if (mean < patience * (trials_ > 0 ? kWorth : kStopBelow) * std::abs(step_before_))
     return release(steps, wait_);
   if (early) return;
   kept_ = kept_ || trials_ > 0;  // the first may pass before the oscillation is damped

@@ -26,9 +26,9 @@ namespace tether::ida_projection {
 namespace {
 
 // IDA's own test promises that one more iteration changes y by at most its tolerance.
-constexpr double kMisled = 2.0;
-constexpr double kAnswered = 0.1;  // tolerances: a shorter move needs no answer of y_a
-constexpr double kAnsweredByMultipliers = 0.01;  // the same where they are of index 2
+constexpr double kMisledFactor = 2.0;
+constexpr double kNeedsResponse = 0.1;  // tolerances: a shorter move needs no answer of y_a
+constexpr double kNeedsResponseOfMultipliers = 0.01;  // the same where they are of index 2
 
 }  // namespace
 
@@ -55,12 +55,12 @@ bool Polish::wanted(double length, bool smoothing) const {
   // those need two iterations in nearly every step, and answer to shorter moves.
   const bool high_index = variables_.any() && variables_.high_index();
   if (smoothing && !high_index) return true;
-  return corrector_.iterations() <= 1 || length > longest_unanswered(smoothing);
+  return corrector_.iterations() <= 1 || length > longest_without_response(smoothing);
 }
 
-double Polish::longest_unanswered(bool smoothing) const {
+double Polish::longest_without_response(bool smoothing) const {
   if (!variables_.any()) return std::numeric_limits<double>::infinity();
-  return smoothing ? kAnsweredByMultipliers : kAnswered;
+  return smoothing ? kNeedsResponseOfMultipliers : kNeedsResponse;
 }
 
 void Polish::keep(const Candidate& candidate) {
@@ -106,7 +106,7 @@ bool Polish::know_noise() {
   return noise_known_;
 }
 
-double Polish::answer(const Candidate& candidate) {
+double Polish::response_length(const Candidate& candidate) {
   if (!know_noise()) return -1.0;
   step_known_ = false;
   if (!newton_step_at_moved_point(candidate)) return -1.0;
@@ -128,7 +128,8 @@ const double* Polish::response(const StepData& step) {
 }
 
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (in_use(Mechanism::foretold_polish) && may_foretell_ && foretell(candidate, cj, tolerance))
+  if (in_use(Mechanism::foretold_polish) && may_forecast_ &&
+      forecast_polish(candidate, cj, tolerance))
     return {true, true};
   const bool asked = step_known_;
   if (!asked) {
@@ -141,29 +142,29 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
   const double algebraic = algebraic_factor(cj);
   // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
   const double length = differential_length(candidate, delta_);
-  if (!asked) look_at_pattern(candidate, cj);
+  if (!asked) learn_pattern(candidate, cj);
   const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;
-  return {true, length <= kMisled * tolerance};
+  return {true, length <= kMisledFactor * tolerance};
 }
 
-void Polish::look_at_pattern(const Candidate& candidate, double cj) {
-  if (!may_foretell_) return;
-  if (variables_.any() || corrector_.iterations() != 1) return foretold_.forget();
+void Polish::learn_pattern(const Candidate& candidate, double cj) {
+  if (!may_forecast_) return;
+  if (variables_.any() || corrector_.iterations() != 1) return forecast_.forget();
   if (contiguous_)
-    foretold_.learn(candidate.weight_entries, corrected_entries_, delta_entries_, size_, cj);
+    forecast_.learn(candidate.weight_entries, corrected_entries_, delta_entries_, size_, cj);
   else
-    foretold_.learn(candidate.weights, corrected_, delta_, cj);
+    forecast_.learn(candidate.weights, corrected_, delta_, cj);
 }
 
 // ycor <- ycor + delta, if earlier steps tell delta.
-bool Polish::foretell(const Candidate& candidate, double cj, double tolerance) {
-  if (step_known_ || corrector_.iterations() != 1 || !foretold_.tells(cj)) return false;
-  foretold_.tell(cj, corrected_, delta_);
-  if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisled * tolerance)) return false;
-  foretold_.used();
+bool Polish::forecast_polish(const Candidate& candidate, double cj, double tolerance) {
+  if (step_known_ || corrector_.iterations() != 1 || !forecast_.tells(cj)) return false;
+  forecast_.tell(cj, corrected_, delta_);
+  if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisledFactor * tolerance)) return false;
+  forecast_.used();
   if (contiguous_) {
     for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
     return true;

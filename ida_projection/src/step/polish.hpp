@@ -31,13 +31,13 @@ class Polish {
   void begin() { iterations_ = 0; }
   void note_setup(double cj) {
     cj_at_setup_ = cj;
-    foretold_.renewed(cj);
+    forecast_.renewed(cj);
   }
-  void corrector_failed() { foretold_.doubt(); }
+  void corrector_failed() { forecast_.doubt(); }
   /// Corrections are those of one vector, each of them polished.
-  void may_foretell() {
-    may_foretell_ = true;
-    foretold_.allocate(delta_);
+  void allow_forecasts() {
+    may_forecast_ = true;
+    forecast_.allocate(delta_);
   }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
   /// For the iteration of sensitivities, which has the same linear solver.
@@ -49,12 +49,12 @@ class Polish {
   /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.
   bool wanted(double length, bool smoothing) const;
   /// Longer moves want an answer of the algebraic variables; infinity where there are none.
-  double longest_unanswered(bool smoothing) const;
+  double longest_without_response(bool smoothing) const;
   /// Can answer() be had?
   bool is_response_available() const { return contiguous_ && corrector_.solves() && !iterative_; }
   /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
   /// in tolerances; -1: F or the linear solver fails.
-  double answer(const Candidate& candidate);
+  double response_length(const Candidate& candidate);
   /// IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
   /// equations contain y'; algebraic ones take the plain solution.
   double algebraic_factor(double cj) const {
@@ -81,8 +81,8 @@ class Polish {
  private:
   bool know_noise();
   bool newton_step_at_moved_point(const Candidate& candidate);
-  bool foretell(const Candidate& candidate, double cj, double tolerance);
-  void look_at_pattern(const Candidate& candidate, double cj);
+  bool forecast_polish(const Candidate& candidate, double cj, double tolerance);
+  void learn_pattern(const Candidate& candidate, double cj);
   double differential_length(const Candidate& candidate, N_Vector v);
   void apply(const Candidate& candidate, double differential, double algebraic);
 
@@ -98,8 +98,8 @@ class Polish {
   double *delta_entries_ = nullptr, *corrected_entries_ = nullptr, *work_entries_ = nullptr;
   bool iterative_ = false;  // IDA's linear solver is a Krylov method
   double cj_at_setup_ = 0.0;
-  Foretold foretold_;
-  bool may_foretell_ = false;
+  PolishForecast forecast_;
+  bool may_forecast_ = false;
   long iterations_ = 0;
 };
 

@@ -41,7 +41,7 @@ void StepControl::restore_weights(N_Vector weights, long last_steps) {
 
 void StepControl::widen_test(const Candidate& candidate, Polish& polish, double move, long steps) {
   if (!algebraic_test_.acts() || !std::isfinite(move)) return;
-  algebraic_test_.look(candidate, move, ida_.order(), std::abs(ida_.step_size()), steps);
+  algebraic_test_.begin_attempt(candidate, move, ida_.order(), std::abs(ida_.step_size()), steps);
   const bool asks = polish.iterations() > 0 && algebraic_test_.limit_step();
   algebraic_test_.widen(candidate, asks ? polish.response(ida_.step()) : nullptr);
 }
@@ -89,7 +89,7 @@ void StepControl::compare_slopes(const Candidate& candidate, long steps, N_Vecto
 
 // IDA may double its step right after a doubling was refused, and raises the order only after k + 2
 // steps of one size: one failed error test a step at order 1 can go on for ever.
-void StepControl::look_for_refusals(bool engaged) {
+void StepControl::count_refusals(bool engaged) {
   if (smoother_.on()) return;
   const long failures = ida_.error_test_failures();
   refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;

@@ -46,7 +46,7 @@ class StepControl {
   /// Errors are steered to a part of what smoothing asks for.
   void begin_smoothing(const Care& care);
   /// For each new step.
-  void look_for_refusals(bool engaged);
+  void count_refusals(bool engaged);
   void expect_oscillations() { order_limit_.expect_oscillations(); }
   /// Before the first move: does IDA fail on algebraic variables in its error test, which would be
   /// taken out of it with that move?

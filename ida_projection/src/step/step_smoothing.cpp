@@ -174,7 +174,7 @@ double StepSmoother::request(double ratio, double h, bool grows, double norm) {
   } else if (ratio > 1.0) {
     set(kLowestFixed, 1.0, ratio, 0.0, max_step_);
   } else if (!owns_max_step_) {
-    return gentle_reduction(ratio, h, norm);
+    return reduce_by_weights(ratio, h, norm);
   } else {
     const double longest = h * ratio;
     set(kLowestFixed, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest);
@@ -185,7 +185,7 @@ double StepSmoother::request(double ratio, double h, bool grows, double norm) {
 // IDA reduces h by any ratio asked for where its own is below 1, which it is for an error above
 // 0.5. Weights that make it so change no decision on the order, which compares errors; the error
 // test has to be passed all the same.
-double StepSmoother::gentle_reduction(double ratio, double h, double norm) {
+double StepSmoother::reduce_by_weights(double ratio, double h, double norm) {
   constexpr double kAsked = 0.55, kPassed = 0.95;
   const double factor = kAsked / (error_constant(h, order_) * norm);
   if (!(factor > 1.0) || factor * test_constant(h, order_) * norm > kPassed) {

@@ -47,7 +47,7 @@ class StepSmoother {
   void refuse(double h) { refused_ = h; }
   /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
   /// norm of IDA's error test. Returns by how much IDA's error weights are to be multiplied for
-  /// the rest of this attempt (1: left alone); see gentle_reduction().
+  /// the rest of this attempt (1: left alone); see reduce_by_weights().
   double control(long steps, double norm);
 
  private:
@@ -63,7 +63,7 @@ class StepSmoother {
   bool near_refused(double h) const { return refused_ > 0.0 && h >= kNearRefused * refused_; }
   void hold();
   double request(double ratio, double h, bool grows, double norm);
-  double gentle_reduction(double ratio, double h, double norm);
+  double reduce_by_weights(double ratio, double h, double norm);
   void set(double lowest_fixed, double highest_fixed, double largest, double low, double max_step);
 
   struct Settings {

@@ -21,7 +21,7 @@ long BypassWatch::steps_without_plugin(long last_steps, bool initialized) const 
   return begun_anew ? steps : steps_unseen_;
 }
 
-void BypassWatch::look(long last_steps, bool initialized, const Report& report) {
+void BypassWatch::check(long last_steps, bool initialized, const Report& report) {
   steps_unseen_ = steps_without_plugin(last_steps, initialized);
   if (steps_unseen_ == 0 || !text_.empty()) return;
   text_ = "IDA took " + std::to_string(steps_unseen_) +

@@ -15,7 +15,7 @@ class BypassWatch {
 
   void begin();  ///< at attachment
   /// `last_steps`: accepted before the last attempt; none seen: -1. Said once.
-  void look(long last_steps, bool initialized, const Report& report);
+  void check(long last_steps, bool initialized, const Report& report);
   long steps() const { return steps_unseen_; }
   /// Advice, once a step went by; it then stays as it is.
   const std::string& text() const { return text_; }

@@ -15,13 +15,13 @@ namespace {
 
 constexpr double kOffItsSet = 2.0;  // tolerances that F has taken a row off its set
 constexpr int kRefinements = 3;
-constexpr double kSettles = 0.1;                      // changes of the rate in the last of them
-constexpr double kRounding = 1e-9;                    // of the terms: differences of g know no less
-constexpr double kConfirmed = 0.5;                    // of it, by a better y'
-constexpr long kFreeLooks = 20, kStepsForLook = 100;  // into doubts
+constexpr double kSettles = 0.1;    // changes of the rate in the last of them
+constexpr double kRounding = 1e-9;  // of the terms: differences of g know no less
+constexpr double kConfirmed = 0.5;  // of it, by a better y'
+constexpr long kFreeChecks = 20, kStepsPerCheck = 100;  // into doubts
 constexpr long kSearchLimit = 2000;  // evaluations of g in one direction to compare entries of C
 constexpr int kVanished = 3;         // steps in which a row of C is zero
-constexpr int kSmallLooks = 3;       // at a solution below its tolerances
+constexpr int kSmallSolutions = 3;   // at a solution below its tolerances
 constexpr double kMoves = 0.05;      // of y in a step: it is no state of rest
 constexpr double kGrows = 1.02;      // for each step: a solution from zero may be small at first
 
@@ -30,34 +30,35 @@ constexpr double kGrows = 1.02;      // for each step: a solution from zero may 
 void FirstSteps::reset() {
   changes_.assign(static_cast<std::size_t>(constraints_.total_count()), {});
   vanished_.assign(changes_.size(), 0);
-  looks_ = small_looks_ = 0;
-  looked_at_ = kSettled;
+  checks_ = small_solutions_ = 0;
+  last_check_ = kSettled;
   false_row_found_ = false;
   idle_row_.clear();
   largest_ = 0.0;
   searched_ = 0;
 }
 
-std::string FirstSteps::look(const Candidate& candidate, const StepData& step, long steps, double h,
-                             N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
-                             Corrector& corrector) {
+std::string FirstSteps::check(const Candidate& candidate, const StepData& step, long steps,
+                              double h, N_Vector corrected, const AlgebraicVariables& variables,
+                              Mover& mover, Corrector& corrector) {
   std::string found;
-  if (largest_ < 1.0 && steps <= kSteps) found = look_at_tolerances(candidate, step, h, corrected);
+  if (largest_ < 1.0 && steps <= kSteps)
+    found = compare_with_tolerances(candidate, step, h, corrected);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
   if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
   const bool due = steps > kSteps || steps % 2 == 0;
-  const bool may = looks_ < kFreeLooks + steps / kStepsForLook;
+  const bool may = checks_ < kFreeChecks + steps / kStepsPerCheck;
   if (!due || !may || candidate.base_entries == nullptr || !has_values(constraints_)) return found;
-  const double span = h * static_cast<double>(std::max(1L, steps - looked_at_));
-  looked_at_ = steps;
-  found = look_for_false_rows(candidate, step, span, corrected, variables.mask(), mover, corrector);
+  const double span = h * static_cast<double>(std::max(1L, steps - last_check_));
+  last_check_ = steps;
+  found = find_false_rows(candidate, step, span, corrected, variables.mask(), mover, corrector);
   return found;
 }
 
 // With |y| below a tolerance in the norm of the error test, y = 0 would pass as well. One that has
 // come from above, or still grows, says nothing.
-std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const StepData& step,
-                                           double h, N_Vector corrected) {
+std::string FirstSteps::compare_with_tolerances(const Candidate& candidate, const StepData& step,
+                                                double h, N_Vector corrected) {
   if (!work_) work_ = OwnedVector(candidate.base);
   N_VLinearSum(1.0, candidate.base, 1.0, corrected, work_);
   const double size = N_VWrmsNorm(work_, candidate.weights);
@@ -66,7 +67,7 @@ std::string FirstSteps::look_at_tolerances(const Candidate& candidate, const Ste
   const bool grows = size > kGrows * largest_;
   largest_ = std::max(largest_, size);
   if (!(size < 1.0) || grows || !(change > kMoves * size)) return {};
-  if (++small_looks_ != kSmallLooks) return {};
+  if (++small_solutions_ != kSmallSolutions) return {};
   PlainText out;
   out << "the whole solution is " << size << " tolerances long at t = " << step.t
       << ", so that IDA's error test cannot see it: reduce atol";
@@ -86,9 +87,9 @@ void FirstSteps::allocate(const Candidate& candidate) {
 
 // C y' + g_t = 0 at the corrector's point, where y' fulfils F. C y' costs a product with the C at
 // hand; only where a row stands out is g evaluated.
-std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const StepData& step,
-                                            double h, N_Vector corrected, const double* id,
-                                            Mover& mover, Corrector& corrector) {
+std::string FirstSteps::find_false_rows(const Candidate& candidate, const StepData& step, double h,
+                                        N_Vector corrected, const double* id, Mover& mover,
+                                        Corrector& corrector) {
   const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
   if (point_.size() != n) allocate(candidate);
   const double* predicted = N_VGetArrayPointer(step.yp_predicted);
@@ -116,7 +117,7 @@ std::string FirstSteps::look_for_false_rows(const Candidate& candidate, const St
         false_row(static_cast<int>(i), change, noticed, candidate, step, id, corrected, corrector);
     change.sum = change.span = 0.0;
     change.limit *= 2.0;  // what was noise is so again
-    ++looks_;
+    ++checks_;
     if (!text.empty()) return text;
   }
   return {};

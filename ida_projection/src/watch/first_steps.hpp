@@ -39,19 +39,19 @@ class FirstSteps {
   const std::string& idle_row() const { return idle_row_; }
   /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
   /// ycor. Returns the fault found; empty: none.
-  std::string look(const Candidate& candidate, const StepData& step, long steps, double h,
-                   N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
-                   Corrector& corrector);
+  std::string check(const Candidate& candidate, const StepData& step, long steps, double h,
+                    N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
+                    Corrector& corrector);
 
  private:
   static constexpr long kSettled = 2;  // accepted steps: before, y' is still that of the start
   static constexpr long kEvery = 16;   // steps, after the first ones
 
-  std::string look_at_tolerances(const Candidate& candidate, const StepData& step, double h,
-                                 N_Vector corrected);
-  std::string look_for_false_rows(const Candidate& candidate, const StepData& step, double h,
-                                  N_Vector corrected, const double* id, Mover& mover,
-                                  Corrector& corrector);
+  std::string compare_with_tolerances(const Candidate& candidate, const StepData& step, double h,
+                                      N_Vector corrected);
+  std::string find_false_rows(const Candidate& candidate, const StepData& step, double h,
+                              N_Vector corrected, const double* id, Mover& mover,
+                              Corrector& corrector);
   void allocate(const Candidate& candidate);
   std::string one_sided_row(double t);
   struct Change {
@@ -69,12 +69,12 @@ class FirstSteps {
 
   const Constraints& constraints_;
   Evaluator evaluator_;
-  Tangency tangency_;               // of the caller's rows
-  std::vector<Change> changes_;     // of each row, since it was looked into
-  std::vector<int> vanished_;       // steps in which a row of C was zero
-  long looks_ = 0, looked_at_ = 0;  // into doubts in rows; the steps at the last look
-  int small_looks_ = 0;             // at doubts in rows; at a solution below its tolerances
-  double largest_ = 0.0;            // size of the solution so far, in tolerances
+  Tangency tangency_;                 // of the caller's rows
+  std::vector<Change> changes_;       // of each row, since it was looked into
+  std::vector<int> vanished_;         // steps in which a row of C was zero
+  long checks_ = 0, last_check_ = 0;  // into doubts in rows; the steps at the last look
+  int small_solutions_ = 0;           // at doubts in rows; at a solution below its tolerances
+  double largest_ = 0.0;              // size of the solution so far, in tolerances
   bool false_row_found_ = false;
   std::string idle_row_;
   long searched_ = 0;                  // unknowns compared

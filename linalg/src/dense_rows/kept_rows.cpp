@@ -17,7 +17,7 @@ void KeptRows::resize(int rows, int columns) {
   const auto each_row = static_cast<std::size_t>(rows);
   n_ = columns;
   places_.resize(rows, columns);
-  looked_at_ = -1;
+  last_check_ = -1;
   A_.assign(entries, 0.0);
   gathered_.assign(each_column, 0.0);
   heads_.assign(each_column, -1);
@@ -39,7 +39,7 @@ void KeptRows::resize(int rows, int columns) {
 bool KeptRows::load(const double* wide, int width, const int* rows, const int* columns,
                     const double* D, double* row_norm, const FilledPlaces* places) {
   const int m = n_ > 0 ? static_cast<int>(A_.size()) / n_ : 0;
-  if (m > 0 && places != nullptr && places->known() != looked_at_)
+  if (m > 0 && places != nullptr && places->known() != last_check_)
     learn(*places, width, rows, columns);
   const bool adjacent = n_ > 0 && columns[n_ - 1] - columns[0] + 1 == n_;
   for (int i = 0; i < m; ++i) {
@@ -50,7 +50,7 @@ bool KeptRows::load(const double* wide, int width, const int* rows, const int* c
       for (int j = 0; j < n_; ++j) gathered_[static_cast<std::size_t>(j)] = c[columns[j]];
       c = gathered_.data();
     }
-    if (places == nullptr) places_.look(i, c);
+    if (places == nullptr) places_.note(i, c);
     double square = 0.0;
     double* const a = A_.data() + static_cast<std::ptrdiff_t>(i) * n_;
     int count = 0;
@@ -78,10 +78,10 @@ void KeptRows::learn(const FilledPlaces& wide, int width, const int* rows, const
       marks_[static_cast<std::size_t>(*j)] = 1.0;
     for (int j = 0; j < n_; ++j)
       gathered_[static_cast<std::size_t>(j)] = marks_[static_cast<std::size_t>(columns[j])];
-    places_.look(i, gathered_.data());
+    places_.note(i, gathered_.data());
     wide.clear(rows[i], marks_.data());
   }
-  looked_at_ = wide.known();
+  last_check_ = wide.known();
 }
 
 void KeptRows::load(const double* unit_rows) {
@@ -89,7 +89,7 @@ void KeptRows::load(const double* unit_rows) {
   for (int i = 0; i < m; ++i) {
     const double* c = unit_rows + static_cast<std::ptrdiff_t>(i) * n_;
     double* a = A_.data() + static_cast<std::ptrdiff_t>(i) * n_;
-    places_.look(i, c);
+    places_.note(i, c);
     for (const int *j = places_.begin(i), *last = places_.end(i); j != last; ++j) *a++ = c[*j];
   }
 }

@@ -66,7 +66,7 @@ class KeptRows {
 
   int n_ = 0;
   FilledPlaces places_;        // columns of each row
-  long looked_at_ = -1;        // how many of the caller's are among them
+  long last_check_ = -1;       // how many of the caller's are among them
   std::vector<double> marks_;  // of a row of the caller's
   std::vector<double> A_;      // the entries there, of row i from i n_ on
   std::vector<double> gathered_;

@@ -8,7 +8,7 @@ namespace tether::linalg {
 
 namespace {
 
-constexpr int kLooks = 2;  // for a row at an end of its group
+constexpr int kMostTests = 2;  // for a row at an end of its group
 
 }  // namespace
 
@@ -75,7 +75,7 @@ int RowOrder::reach(int start, int first) {
 }
 
 int RowOrder::far_from(int start, int first) {
-  for (int look = 0; look < kLooks; ++look) {
+  for (int look = 0; look < kMostTests; ++look) {
     const int end = reach(start, first);
     start = queue_[end - 1];
     for (int e = first; e < end; ++e) reached_[static_cast<std::size_t>(queue_[e])] = 0;

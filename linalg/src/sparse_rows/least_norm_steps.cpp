@@ -63,8 +63,8 @@ bool LeastNormSteps::done(double step, double left) const {
   return left <= tolerance_ * size_ + 2.0 * kEpsilon * length || step <= tolerance_ * length;
 }
 
-void LeastNormSteps::take_back(const System& system, double share, const std::vector<double>& step,
-                               double* left) {
+void LeastNormSteps::remove_rest_with_kept_factors(const System& system, double share,
+                                                   const std::vector<double>& step, double* left) {
   for (std::size_t j = 0; j < du_.size(); ++j) du_[j] -= share * step[j];
   *left = find_left(system);
 }
@@ -85,7 +85,7 @@ bool LeastNormSteps::proximal_steps(const System& system, double* left) {
     }
     *left = find_left(system);
     if (*left > before) {  // rounding prevails: the rows give no more of b
-      take_back(system, 1.0, step_, left);
+      remove_rest_with_kept_factors(system, 1.0, step_, left);
       return true;
     }
     if (done(step, *left)) return true;
@@ -111,7 +111,8 @@ void LeastNormSteps::gradient_steps(const System& system, double* left) {
     for (std::size_t j = 0; j < du_.size(); ++j) du_[j] += share * p_[j];
     for (std::size_t i = 0; i < z_.size(); ++i) z_[i] -= share * MAp_[i];
     *left = find_left(system);
-    if (*left > before) return take_back(system, share, p_, left);  // rounding prevails
+    if (*left > before)
+      return remove_rest_with_kept_factors(system, share, p_, left);  // rounding prevails
     system.rows.transposed(z_.data(), step_.data());
     const double next = dot(step_.data(), step_.data(), step_.size());
     if (done(std::sqrt(next), *left)) return;

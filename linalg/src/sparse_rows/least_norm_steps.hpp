@@ -34,7 +34,8 @@ class LeastNormSteps {
   double find_left(const System& system);
   double find_step(const System& system);
   bool first_step(const System& system, double* left);
-  void take_back(const System& system, double share, const std::vector<double>& step, double* left);
+  void remove_rest_with_kept_factors(const System& system, double share,
+                                     const std::vector<double>& step, double* left);
   bool done(double step, double left) const;
   bool proximal_steps(const System& system, double* left);
   void gradient_steps(const System& system, double* left);

@@ -13,7 +13,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
-constexpr int kLevelLooks = 16;
+constexpr int kMostRateSearches = 16;
 constexpr int kEarly = 64;       // factorisations, of a start
 constexpr double kAlike = 0.05;  // of a sum of squares
 
@@ -22,7 +22,7 @@ constexpr double kAlike = 0.05;  // of a sum of squares
 template <class Rows>
 Status ContiguousRows<Rows>::load(const Candidate& candidate, bool refills) {
   at_.load(candidate);
-  if (!refills) metric_.look(at_);
+  if (!refills) metric_.update_scale(at_);
   uses_.decided = moved_ = false;
   return blocks_.structured() ? Status::success : structure(candidate, nullptr);
 }
@@ -69,12 +69,12 @@ bool ContiguousRows<Rows>::use_levels(bool on) {
 }
 
 template <class Rows>
-void ContiguousRows<Rows>::look_for_rates() {
+void ContiguousRows<Rows>::find_rates() {
   const bool wanted = in_use(Mechanism::rate_limit) &&
                       options_.advanced.metric == Metric::local_correction && at_.knows_rates();
-  const bool early = factored_ <= kEarly && rate_looks_ < kLevelLooks;
+  const bool early = factored_ <= kEarly && rate_searches_ < kMostRateSearches;
   if (!wanted || metric_.by_rates() || !early) return;
-  ++rate_looks_;
+  ++rate_searches_;
   const std::vector<int>& found = levels();
   if (found.empty() || !first_are_rates_of_zeroth(found)) return;
   metric_.use_rates(found);
@@ -165,7 +165,7 @@ template <class Rows>
 bool ContiguousRows<Rows>::decide() {
   ++statistics_.factorizations;
   uses_.partial = false;
-  if (count() > kFewForLevels) look_for_rates();
+  if (count() > kFewForLevels) find_rates();
   if (!blocks_.factor()) return false;
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows)
@@ -196,7 +196,7 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
   else
     blocks_.solve(g_);
   found.length = length_of_solution();
-  if (how == Solve::look) --statistics_.iterations;
+  if (how == Solve::test) --statistics_.iterations;
   if (how == Solve::first && uses_.thin) {
     const double alone = found.length;
     found.length = judge_thin_rows(alone);
@@ -343,7 +343,7 @@ void ContiguousRows<Rows>::reset() {
   metric_.reset();
   if constexpr (Rows::kThinRows) blocks_.trust.reset();
   usual_ = 0.0;
-  factored_ = rate_looks_ = 0;
+  factored_ = rate_searches_ = 0;
   levels_known_ = false;
 }
 

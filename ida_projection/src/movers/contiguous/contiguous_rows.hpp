@@ -59,7 +59,9 @@ class ContiguousRows final : public RowsAt {
   bool keeps_factors() const override {
     return in_use(Mechanism::kept_factors) && Rows::kKeepsFactors && uses_.lasting;
   }
-  bool may_look() const override { return uses_.there && !uses_.thin && !blocks_.dropped_rows(); }
+  bool may_test_with_factors() const override {
+    return uses_.there && !uses_.thin && !blocks_.dropped_rows();
+  }
   bool decided() const override { return uses_.decided; }
   void forget_rank() override { uses_.lasting = false; }
   // Stale factors leave more of what dropped rows ask for.
@@ -67,7 +69,7 @@ class ContiguousRows final : public RowsAt {
     return Rows::kKeepsFactors ? !blocks_.dropped_rows() : traits.measures_rest;
   }
   bool contradicts() override;
-  void look_again_soon() override { blocks_.look_again_soon(); }
+  void refresh_pattern_soon() override { blocks_.refresh_pattern_soon(); }
 
   Status set_algebraic(const Candidate& candidate, N_Vector id) override {
     at_.load(candidate);
@@ -132,7 +134,7 @@ class ContiguousRows final : public RowsAt {
   double judge_thin_rows(double length);
   Status learn_trust(double length);
   const std::vector<int>& levels();
-  void look_for_rates();
+  void find_rates();
   bool first_are_rates_of_zeroth(const std::vector<int>& levels);
   bool dropped_follow();
   bool only_rounding(std::size_t i) const;
@@ -159,7 +161,7 @@ class ContiguousRows final : public RowsAt {
   std::vector<double> kept_g_, rounding_;  // work space of rounding_length()
   bool rows_known_ = false;                // C belongs to the present y
   bool moved_ = false;                     // this candidate
-  int factored_ = 0, rate_looks_ = 0;
+  int factored_ = 0, rate_searches_ = 0;
   std::vector<int> found_levels_;
   bool levels_known_ = false;  // they are those of the rows as they are arranged
   double usual_ = 0.0;         // asked for by dropped rows after the moves, when that was decided

@@ -29,7 +29,7 @@ class VectorMetric {
   /// Components that are zero in `id` do not move.
   void hold_all_but(N_Vector id) { N_VProd(free_, id, free_); }
   /// s <- max(0.8 s, |correction|) for accept(); of two spare vectors.
-  void look(const Candidate& candidate, OwnedVector& changes, OwnedVector& spare) {
+  void update_scale(const Candidate& candidate, OwnedVector& changes, OwnedVector& spare) {
     if (!local()) return;
     N_VAbs(candidate.correction, changes);
     larger(0.8, scale_, changes, trial_, spare);

@@ -39,7 +39,7 @@ class VectorRows final : public RowsAt {
   Status load(const Candidate& candidate, bool) override {
     at_ = candidate;
     restart(candidate);
-    metric_.look(candidate, work_, dy_);
+    metric_.update_scale(candidate, work_, dy_);
     return Status::success;
   }
   Status value(double t, bool) override {
@@ -61,7 +61,7 @@ class VectorRows final : public RowsAt {
     return status;
   }
   Solution solve(Solve how) override {
-    if (how != Solve::look) ++statistics_.iterations;
+    if (how != Solve::test) ++statistics_.iterations;
     rows_.solve(metric_.D(), dy_);
     Solution found;
     found.length = N_VWrmsNorm(dy_, at_.weights);
@@ -87,8 +87,10 @@ class VectorRows final : public RowsAt {
   double drift() const override { return rows_.drift(); }
   bool has_factors() const override { return factored_; }
   void forget_factors() override { factored_ = false; }
-  bool keeps_factors() const override { return no_settle_ && !metric_.local() && may_look(); }
-  bool may_look() const override { return factored_ && rows_.whole(); }
+  bool keeps_factors() const override {
+    return no_settle_ && !metric_.local() && may_test_with_factors();
+  }
+  bool may_test_with_factors() const override { return factored_ && rows_.whole(); }
   bool contradicts() override {
     if (!rows_.contradict(dy_)) return false;
     contradicting = rows_.report.rows;

@@ -36,12 +36,12 @@ class FilledPlaces {
   void resize(int rows, int columns);
   /// Takes up what is not zero in row i, c[0 .. columns - 1], outside its known places; next to
   /// nothing is done where all of that is zero.
-  void look(int i, const double* c) {
+  void note(int i, const double* c) {
     if (others(i, c)) learn(i, c);
   }
   /// The same for all rows, which follow each other from c on, at a third of the work. c is as
   /// before in the end.
-  void look_at_all(double* c);
+  void note_all(double* c);
   /// Zeros in the known places of all rows, which follow each other from c on.
   void clear_all(double* c);
   /// Zeros in the known places of row i.
@@ -66,7 +66,7 @@ class FilledPlaces {
   bool list_all();
   std::vector<std::ptrdiff_t> list_;
   long listed_ = 0;
-  std::vector<double> lifted_;  // work space of look_at_all()
+  std::vector<double> lifted_;  // work space of note_all()
 };
 
 }  // namespace tether::linalg
