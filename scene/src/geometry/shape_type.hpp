@@ -1,6 +1,7 @@
 // Tether: what scenes know of one kind of shape. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/export.hpp>
 #include <tether/linalg/pi.hpp>
 #include <tether/scene/scene.hpp>
 #include <variant>
@@ -41,7 +42,10 @@ class ShapeType {
   virtual std::optional<Eigen::Vector3d> make_unit(Shape&) const { return {}; }
 };
 
+/// The importer, a library of its own, asks it, too.
+TETHER_EXPORT_BEGIN
 const ShapeType& type_of(ShapeKind kind);
+TETHER_EXPORT_END
 
 #define TETHER_SHAPE_TYPE(kind, Type) \
   const ShapeType& kind##_type() {    \
