@@ -135,7 +135,8 @@ bool has_collision(ShapeKind a, ShapeKind b) {
 
 void collide(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
              NearPoints& out) {
-  if (form(a.kind).rank() <= form(b.kind).rank()) return collide_ordered(a, A, b, B, margin, out);
+  if (a.kind == b.kind || form(a.kind).rank() <= form(b.kind).rank())
+    return collide_ordered(a, A, b, B, margin, out);
   const int from = out.count;
   collide_ordered(b, B, a, A, margin, out);
   turn(out, from);

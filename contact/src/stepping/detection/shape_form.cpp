@@ -2,6 +2,7 @@
 #include "stepping/detection/shape_parts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <tether/linalg/index.hpp>
 #include <tether/linalg/pi.hpp>
 
@@ -31,15 +32,18 @@ static_assert(0
               "each kind has a file in the folder shapes");
 #undef SHAPE
 
+// Asked for every pair of bodies that are near.
 const ShapeForm& form(ShapeKind kind) {
-  switch (kind) {
-#define SHAPE(each)     \
-  case ShapeKind::each: \
-    return each##_form();
+  static const std::array forms = [] {
+    std::array<const ShapeForm*, kShapeKinds.size()> all{};
+#define SHAPE(each) all[static_cast<std::size_t>(ShapeKind::each)] = &each##_form();
 #include "shape_list.inc"
 #undef SHAPE
-  }
-  throw std::logic_error("a shape of no kind");
+    return all;
+  }();
+  const auto k = static_cast<std::size_t>(kind);
+  if (k >= forms.size()) throw std::logic_error("a shape of no kind");
+  return *forms[k];
 }
 
 void check_points(const Shape& s, std::size_t least) {
