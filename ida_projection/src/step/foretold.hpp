@@ -12,6 +12,7 @@ class PolishForecast {
   /// Before the others; once.
   void allocate(N_Vector like) {
     beyond_ = OwnedVector(like);
+    N_VConst(0.0, beyond_);
     work_ = OwnedVector(like);
   }
   void forget() { cj_ = 0.0; }
