@@ -1,8 +1,12 @@
 // Tether: invalid operations, divisions by zero and overflow end the program while a Traps lives.
+// Memory begins with numbers whose squares overflow, so that reading before writing does, too.
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <cfenv>
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 namespace tether::test {
 
@@ -13,8 +17,12 @@ class Traps {
   Traps() {
     std::feclearexcept(FE_ALL_EXCEPT);
     feenableexcept(kThree);
+    mallopt(M_PERTURB, 0x80);  // each byte is the complement
   }
-  ~Traps() { fedisableexcept(kThree); }
+  ~Traps() {
+    fedisableexcept(kThree);
+    mallopt(M_PERTURB, 0);
+  }
   Traps(const Traps&) = delete;
   Traps& operator=(const Traps&) = delete;
 
