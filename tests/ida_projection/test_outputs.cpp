@@ -1,5 +1,6 @@
 // Tether: algebraic variables on which nothing depends, and runs that repeat.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <problems/car_axis.hpp>
 #include <problems/governor.hpp>
@@ -7,6 +8,7 @@
 #include <problems/pendulum.hpp>
 
 #include "host.hpp"
+#include "motions.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::test;
@@ -133,6 +135,65 @@ TEST_CASE("coupled algebraic variables: forces that are switched are passed") {
     CHECK(run.error <= 30.0 * tolerance);
     CHECK(run.steps <= 400);
   }
+}
+
+namespace {
+
+/// On in every second interval of 0.37: 27 jumps until t = 10.
+double switched_force(double t) { return static_cast<long>(t / 0.37) % 2 == 1 ? 5.0 : 0.0; }
+
+double worst(const Run& run, const Run& exact) {
+  double error = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) error = std::max(error, std::abs(run.y[i] - exact.y[i]));
+  return error;
+}
+
+}  // namespace
+
+TEST_CASE("coupled algebraic variables: 27 jumps of a force are passed") {
+  Problem swing = pendulum(1.0, 9.81, 10.0, "index 1");
+  swing.residual = [quiet = swing.residual](double t, const double* y, const double* yp,
+                                            double* r) {
+    quiet(t, y, yp, r);
+    r[2] -= switched_force(t);
+    r[4] += switched_force(t) * y[0];
+  };
+  const tp::Constraints rows = swing.select({"position", "velocity"});
+  const Run exact = integrate(swing, 1e-10, rows, {}, false);
+  for (const double tolerance : {7.5e-5, 1e-6, 1e-8}) {
+    INFO("tolerance " << tolerance);
+    const Run run = integrate(swing, tolerance, rows, {}, false);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.status == tp::Status::success);
+    CHECK(run.steps <= 3500);
+    CHECK(worst(run, exact) <= 400.0 * tolerance);
+  }
+}
+
+TEST_CASE("a long move does not hide a jump of F from the error test") {
+  // Near the lowest point the shortest move in the metric takes the new speed back.
+  const Problem swing = ode({1.0, 0.0, 0.0, 0.0}, 10.0, [](double t, const double* y, double* f) {
+    const double force = switched_force(t);
+    const double pull =
+        (y[2] * y[2] + y[3] * y[3] + force * y[0] - 9.81 * y[1]) / (y[0] * y[0] + y[1] * y[1]);
+    f[0] = y[2];
+    f[1] = y[3];
+    f[2] = force - pull * y[0];
+    f[3] = -9.81 - pull * y[1];
+  });
+  const tp::Constraints rows =
+      pendulum(1.0, 9.81, 10.0, "index 1").select({"position", "velocity"});
+  const Run exact = integrate_plain(swing, 1e-11);
+  double ratios = 0.0;
+  for (int k = 8; k < 16; ++k) {
+    const double tolerance = 1e-3 * std::pow(10.0, -k / 8.0);
+    INFO("tolerance " << tolerance);
+    const double ours = worst(integrate(swing, tolerance, rows, {}, false), exact);
+    const double plain = worst(integrate_plain(swing, tolerance), exact);
+    CHECK(ours <= 3.0 * plain);
+    ratios += std::log(ours / plain);
+  }
+  CHECK(std::exp(ratios / 8) <= 0.5);
 }
 
 TEST_CASE("outputs: values between steps are right to the tolerance, as plain IDA's") {

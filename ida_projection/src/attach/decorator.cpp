@@ -18,6 +18,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSampleEvery = 16;
+constexpr double kSudden = 10.0;     // times the last accepted move: that of a row is steadier
 constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
 constexpr double kShortMove = 1.0;   // tolerances: after a longer one the move comes first
 
@@ -134,8 +135,15 @@ void Projection::Impl::choose_step(const Candidate& candidate) {
   const bool suppressed = run_.suppressed;
   if (in_use(Mechanism::widened_tolerance) && suppressed)
     control_.widen_test(candidate, polish_, attempts_.moved, steps);
+  // Rows that nearly depend on each other ask for long moves of their own, and a row that F does
+  // not keep for such a one in every step.
+  const bool long_move = in_use(Mechanism::tested_long_moves) && attempts_.pending &&
+                         attempts_.moved > options_.advanced.largest_move &&
+                         attempts_.moved > kSudden * attempts_.accepted_move &&
+                         movers_.used->rows().may_test_with_factors();
   control_.control(candidate, steps, run_.engaged, suppressed ? variables_.tested() : nullptr,
-                   suppressed ? variables_.id() : nullptr);
+                   suppressed ? variables_.id() : nullptr,
+                   long_move ? polish_.corrected() : nullptr);
 }
 
 int Projection::Impl::caught(Status outcome, const char* text) noexcept {
@@ -275,6 +283,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   if (!attempts_.repeated) control_.count_refusals(run_.engaged);
   if (!attempts_.repeated && attempts_.pending) {
     attempts_.left_before = attempts_.left;
+    attempts_.accepted_move = attempts_.last_move;
     movers_.used->rows().accept();
     if (options_.progress) {
       attempts_.progress.steps = steps;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -120,8 +121,9 @@ class Projection::Impl {
     bool repeated = false;         // IDA rejected it
     double moved = 0.0;            // tolerances; infinity: no point was found
     double last_move = 0.0;        // that was found, in tolerances
-    Progress progress;             // what the caller is told once it is accepted
-    bool pending = false;          // a projected one that is not yet judged
+    double accepted_move = std::numeric_limits<double>::infinity();  // of the last accepted step
+    Progress progress;     // what the caller is told once it is accepted
+    bool pending = false;  // a projected one that is not yet judged
     // Lengths that capped moves lacked, in tolerances: in the last accepted step, and in this
     // attempt.
     double left_before = 0.0, left = 0.0;

@@ -21,6 +21,7 @@ enum class Mechanism {
   widened_tolerance,      ///< of algebraic variables that respond to moves
   index_in_trouble,       ///< F is asked for its index where error tests fail
   care,                   ///< smaller errors in index 2, by tolerance and order
+  tested_long_moves,      ///< the error test sees the correction before a long move, too
   row_trust,              ///< thin rows count only as far as C can be trusted
   kept_rank,              ///< which rows are independent is found out now and then
   kept_factors,           ///< factors of many sparse rows serve several steps
@@ -42,6 +43,7 @@ inline constexpr const char* kMechanismNames[] = {"repeated correction",
                                                   "widened tolerance",
                                                   "index in trouble",
                                                   "care",
+                                                  "tested long moves",
                                                   "row trust",
                                                   "kept rank",
                                                   "kept factors",

@@ -10,7 +10,7 @@
 //
 // A jump of F in time, as under a force that is switched, makes y_a jump, too. Steps that reach
 // beyond it fail the test however short they are, and those before it are accepted without end. The
-// test is left out then until steps are as long again as the first one that was refused.
+// test is left out then until ten steps in a row were accepted.
 #include "step/algebraic_test.hpp"
 
 #include <algorithm>
@@ -25,10 +25,14 @@ namespace {
 // forms of index 1 and the roots of titrations; from ten thousand on some of these end at another
 // root.
 constexpr double kOfNoise = 1e3;
+constexpr double kRounding = 1e3 * std::numeric_limits<double>::epsilon();  // of y_a, by F and J
 constexpr double kMemory = 0.9;  // per step: S changes slowly
 constexpr double kStays = 0.5;   // of the error; a shorter step lowers it as h, to 1/16 at least
 // So much shorter a step that y_a did not follow: fronts of titrations are 1e4 times wider.
 constexpr double kAtOnce = 1e-6;
+// Accepted steps in a row. Before a jump there are at most five, as IDA cuts a refused step to a
+// quarter; those of the history that reach back before it are six.
+constexpr int kBeyond = 10;
 
 double noise_in_test(int order) {
   double binomial = 1.0;
@@ -42,21 +46,22 @@ void AlgebraicTest::begin(const std::vector<int>& variables) {
   variables_.clear();
   for (const int j : variables) variables_.push_back({j, 0.0, 0.0});
   steps_ = -1;
+  accepted_ = 0;
   refused_h_ = 0.0;
   jump_ = false;
 }
 
 // An attempt at the same step: the last one was refused.
 void AlgebraicTest::look_for_jump(double h, long steps) {
-  if (steps != steps_) {
-    if (h_ < refused_h_) return;
+  accepted_ = steps != steps_ ? accepted_ + 1 : 0;
+  if (accepted_ > kBeyond) {
     refused_h_ = 0.0;
     jump_ = false;
-  } else if (refused_h_ == 0.0) {
+  } else if (accepted_ == 0 && refused_h_ == 0.0) {
     refused_h_ = h_;
     refused_error_ = error_;
-  } else {
-    jump_ = jump_ || (h < kAtOnce * refused_h_ && error_ > kStays * refused_error_);
+  } else if (accepted_ == 0 && h < kAtOnce * refused_h_ && error_ > kStays * refused_error_) {
+    jump_ = true;
   }
 }
 
@@ -95,10 +100,12 @@ bool AlgebraicTest::stay() const { return error_ > kStays * first_error_; }
 void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
   double* weights = N_VGetArrayPointer(candidate.weights);
   for (Variable& v : variables_) {
-    if (response != nullptr && move_ > 0.0)
+    const double y = candidate.base_entries[v.index];
+    // Divided by a move that is next to nothing, rounding would be taken for S.
+    if (response != nullptr && std::abs(response[v.index]) > kRounding * std::abs(y))
       v.response = std::max(v.response, std::abs(response[v.index]) / move_);
     v.weight = weights[v.index];
-    weights[v.index] = jump_ ? 0.0 : widened(v, v.weight, candidate.base_entries[v.index]);
+    weights[v.index] = jump_ ? 0.0 : widened(v, v.weight, y);
   }
 }
 

@@ -42,9 +42,10 @@ class AlgebraicTest {
   double move_ = 0.0, noise_ = 0.0;
   double error_ = 0.0, first_error_ = 0.0;  // as IDA's test sees them; of the first attempt
   double h_ = 0.0;
-  // The longest refused step since steps were as long, and its error; 0: none was.
+  // The first refused step since many in a row were accepted, and its error; 0: none was.
   double refused_h_ = 0.0, refused_error_ = 0.0;
-  bool jump_ = false;  // it stays in steps that are far shorter
+  int accepted_ = 0;   // in a row
+  bool jump_ = false;  // the error stays in steps that are far shorter
 };
 
 }  // namespace tether::ida_projection

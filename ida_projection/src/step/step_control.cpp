@@ -48,7 +48,7 @@ void StepControl::widen_test(const Candidate& candidate, Polish& polish, double 
 
 // |ycor| decides the next step size, and what it is beside the second difference the order.
 void StepControl::control(const Candidate& candidate, long steps, bool engaged, N_Vector tested,
-                          N_Vector differential) {
+                          N_Vector differential, N_Vector unmoved) {
   if (!engaged && !smoother_.on()) return;
   const auto norm = [&] { return error_norm(candidate.correction, candidate.weights, tested); };
   if (smoother_.on()) {
@@ -59,6 +59,13 @@ void StepControl::control(const Candidate& candidate, long steps, bool engaged, 
     weights_factor_ =
         order_limit_.control(steps, candidate.t, order_limit_.lowering() ? norm() : 0.0);
     statistics_.order_limited = order_limit_.begun();
+  }
+  // Scales made of the correction let a long move take back what a jump of F has changed: the test
+  // sees the correction as it was as well.
+  if (unmoved != nullptr) {
+    const double before = error_norm(unmoved, candidate.weights, tested), after = norm();
+    const bool hides = before > ida_.order() + 1 && after > 0.0 && before > after;
+    if (hides) weights_factor_ *= before / after;
   }
   if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }

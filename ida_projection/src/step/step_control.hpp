@@ -28,9 +28,10 @@ class StepControl {
   void restore_weights(N_Vector weights, long last_steps);
   /// At the end of a successful one, `steps` accepted before it. `engaged`: the projection acts,
   /// and the candidate's time is known; `tested`: the variables of IDA's error test,
-  /// `differential`: those whose oscillations count (null: all).
+  /// `differential`: those whose oscillations count (null: all); `unmoved`: the correction before a
+  /// long move (null: a short one).
   void control(const Candidate& candidate, long steps, bool engaged, N_Vector tested,
-               N_Vector differential);
+               N_Vector differential, N_Vector unmoved);
   /// IDA's error test sees these algebraic variables, widened by the noise of moves.
   void test_algebraic(const std::vector<int>& variables) { algebraic_test_.begin(variables); }
   bool tests_algebraic() const { return algebraic_test_.acts(); }
