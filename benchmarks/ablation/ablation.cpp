@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
     only.erase(only.begin(), only.begin() + 2);
   }
   fmt::print("problem,form,tolerance,class,steps,F,error,failed\n");
-  for (const bench::Case& which : bench::catalogue(only, {"long pendulum"}))
+  for (const bench::Case& which : bench::selected(bench::catalogue(), only, {"long pendulum"}))
     for (const problems::Problem& form : which.forms)
       for (const double tolerance : kTolerances)
         if (form.index <= 2) run(which.name, form, tolerance, options, size_class(form.size));

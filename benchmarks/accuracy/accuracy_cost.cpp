@@ -177,7 +177,7 @@ int run(const Arguments& arguments) {
     list(catalogue());
     return 0;
   }
-  const std::vector<Case> cases = catalogue(arguments.problems, arguments.skip);
+  const std::vector<Case> cases = selected(catalogue(), arguments.problems, arguments.skip);
   const Codes codes = wanted_codes(arguments.peers);
   check_writable(arguments);
   std::vector<std::string> peers;

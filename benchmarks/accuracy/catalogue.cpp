@@ -107,8 +107,8 @@ std::vector<Case> dae_set() {
   };
 }
 
-std::vector<Case> catalogue(const std::vector<std::string>& only,
-                            const std::vector<std::string>& skip) {
+std::vector<Case> selected(std::vector<Case> cases, const std::vector<std::string>& only,
+                           const std::vector<std::string>& skip) {
   const auto has = [](const Case& which, std::string name) {
     std::replace(name.begin(), name.end(), '_', ' ');
     return which.name.find(name) != std::string::npos;
@@ -117,11 +117,10 @@ std::vector<Case> catalogue(const std::vector<std::string>& only,
     return std::any_of(names.begin(), names.end(),
                        [&](const std::string& name) { return has(which, name); });
   };
-  std::vector<Case> cases = catalogue(), wanted;
+  std::vector<Case> wanted;
   for (const std::string& name : only)
     if (std::none_of(cases.begin(), cases.end(), [&](const Case& c) { return has(c, name); }))
-      throw std::invalid_argument("--problem: no problem's name contains \"" + name +
-                                  "\"; accuracy_cost --list shows them");
+      throw std::invalid_argument("--problem: no problem's name contains \"" + name + "\"");
   for (Case& which : cases)
     if ((only.empty() || any(which, only)) && !any(which, skip)) wanted.push_back(std::move(which));
   return wanted;

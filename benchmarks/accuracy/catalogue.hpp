@@ -23,7 +23,7 @@ std::vector<Case> dae_set();
 
 /// Those whose name contains one of `only` (all when it is empty) and none of `skip`; "_" may stand
 /// for a blank. std::invalid_argument when a name of `only` fits no case.
-std::vector<Case> catalogue(const std::vector<std::string>& only,
-                            const std::vector<std::string>& skip);
+std::vector<Case> selected(std::vector<Case> cases, const std::vector<std::string>& only,
+                           const std::vector<std::string>& skip = {});
 
 }  // namespace tether::bench

@@ -150,23 +150,8 @@ Codes wanted_codes() {
   return wanted;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  CLI::App app("The DAE problems of SciMLBenchmarks, by every code");
-  std::vector<std::string> problems;
-  std::vector<double> tolerances = {1e-4, 1e-6, 1e-8, 1e-10};
-  double seconds = 10.0;
-  int repeats = 3;
-  std::string pictures;
-  app.add_option("--problem", problems, "Only problems whose name contains one of these")
-      ->delimiter(',');
-  app.add_option("--tolerances", tolerances, "From loose to tight")->delimiter(',');
-  app.add_option("--seconds", seconds, "CPU limit of one run")->check(CLI::PositiveNumber);
-  app.add_option("--repeats", repeats, "Runs of which the median time counts")
-      ->check(CLI::Range(1, 100));
-  app.add_option("--svg", pictures, "Folder for pictures, error against time");
-  CLI11_PARSE(app, argc, argv);
+int run(const std::vector<Case>& cases, const std::vector<double>& tolerances, double seconds,
+        int repeats, const std::string& pictures) {
   if (!pictures.empty()) mkdir(pictures.c_str(), 0777);
 
   const Limits limits{300000, seconds};
@@ -174,12 +159,7 @@ int main(int argc, char** argv) {
   std::string table = head({"problem", "form", "IDA", "IDA suppressed", "Tether", "digits", "F",
                             "time", "Tether beside IDA"});
   std::string details;
-  for (const Case& which : dae_set()) {
-    if (!problems.empty() &&
-        std::none_of(problems.begin(), problems.end(), [&](const std::string& name) {
-          return which.name.find(name) != std::string::npos;
-        }))
-      continue;
+  for (const Case& which : cases) {
     fmt::print(stderr, "{}\n", which.name);
     details += fmt::format("\n## {}: {}\n\n", which.name, which.text);
     std::vector<std::string> columns = {"form", "tolerance"};
@@ -210,4 +190,35 @@ int main(int argc, char** argv) {
   }
   fmt::print("{}{}", table, details);
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The DAE problems of SciMLBenchmarks, by every code");
+  std::vector<std::string> problems;
+  std::vector<double> tolerances = {1e-4, 1e-6, 1e-8, 1e-10};
+  double seconds = 10.0;
+  int repeats = 3;
+  std::string pictures;
+  app.add_option("--problem", problems, "Only problems whose name contains one of these")
+      ->delimiter(',');
+  app.add_option("--tolerances", tolerances, "From loose to tight")->delimiter(',');
+  app.add_option("--seconds", seconds, "CPU limit of one run")->check(CLI::PositiveNumber);
+  app.add_option("--repeats", repeats, "Runs of which the median time counts")
+      ->check(CLI::Range(1, 100));
+  app.add_option("--svg", pictures, "Folder for pictures, error against time");
+  try {
+    app.parse(argc, argv);
+    for (const double tolerance : tolerances)
+      if (!(tolerance > 0.0 && tolerance < 1.0))
+        throw std::invalid_argument(
+            fmt::format("--tolerances: {:g}: must be > 0 and < 1", tolerance));
+    return run(selected(dae_set(), problems), tolerances, seconds, repeats, pictures);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "dae_set: {}\n", error.what());
+    return 1;
+  }
 }

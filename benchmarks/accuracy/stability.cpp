@@ -136,7 +136,7 @@ int main(int argc, char** argv) {
   Json items = Json::array();
   std::vector<Case> cases;
   try {
-    cases = catalogue(only, skip);
+    cases = selected(catalogue(), only, skip);
   } catch (const std::exception& error) {
     fmt::print(stderr, "stability: {}\n", error.what());
     return 2;

@@ -263,15 +263,15 @@ def record(scene_file, text, program, end, folder):
 
 def verify(file, given):
     """Exit code, and the Judge or the reason why there is none."""
-    text = pathlib.Path(file).read_text()
-    scene = Scene(text)
-    if scene.repeats:
-        return 2, "the scene repeats bodies or joints"
-    with tempfile.TemporaryDirectory() as folder:
-        try:
+    try:
+        text = pathlib.Path(file).read_text()
+        scene = Scene(text)
+        if scene.repeats:
+            return 2, "the scene repeats bodies or joints"
+        with tempfile.TemporaryDirectory() as folder:
             judge = Judge(scene, read_records(given.csv or record(file, text, given.tether, given.end, folder))).run()
-        except RuntimeError as error:
-            return 2, str(error)
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:  # of files, the program, cells, columns
+        return 2, f"{given.csv or file}: {error}"
     return 1 if judge.faults else 0 if judge.mechanics() else 2, judge
 
 

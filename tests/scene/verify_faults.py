@@ -2,6 +2,7 @@
 """Does scene/tools/verify.py pass records as they are, and find a hundred planted faults? SPDX-License-Identifier: BSD-3-Clause
 
     verify_faults.py TETHER SCENES"""
+import argparse
 import copy
 import pathlib
 import random
@@ -48,7 +49,29 @@ def lost_impulse(random_, scene, records):
     contact["force"] = [0.99 * x for x in contact["force"]]
 
 
+def broken_inputs(program, scenes):
+    """Files that are no scene and no record are told so; what is accepted of them."""
+    good, accepted = (pathlib.Path(scenes) / "incline.toml").read_text(), []
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        (folder / "incline.toml").write_text(good)
+        table = pathlib.Path(verify.record(folder / "incline.toml", good, program, 0.01, folder))
+        (folder / "cut.csv").write_text(table.read_text()[:-30])
+        (folder / "other.csv").write_text("a,b\n1,2\n")
+        (folder / "cut.toml").write_text(good[:100])
+        for scene, record in (("cut.toml", None), ("missing.toml", None), ("incline.toml", "cut.csv"), ("incline.toml", "other.csv"),
+                              ("incline.toml", "missing.csv")):
+            given = argparse.Namespace(csv=record and str(folder / record), tether=program, end=0.01)
+            code, reason = verify.verify(folder / scene, given)
+            if code != 2 or not isinstance(reason, str):
+                accepted.append(f"{scene} with {record}")
+    return accepted
+
+
 def main(program, scenes):
+    accepted = broken_inputs(program, scenes)
+    if accepted:
+        return f"accepted: {accepted}"
     random_, planted, found = random.Random(1), 0, 0
     recorded = []
     for name, end in SCENES.items():
