@@ -120,15 +120,14 @@ TEST_CASE("many rows: C is zero on entry, after a callback that has failed, too"
   CHECK(runs[0].statistics.failures() == 2);
 }
 
-TEST_CASE("many redundant rows: factors of an earlier step raise no doubt about C") {
+TEST_CASE("many redundant sparse rows: their factors raise no doubt about C") {
   // 144 rows: too many for the factors of dense ones.
   using Many = BodiesOf<36>;
   const Problem problem = Many::problem(4.0);
   const Run run = integrate(problem, 1e-6, as_sparse(Many::distances(), problem.size), {}, false);
   REQUIRE(run.flag >= 0);
-  CHECK(run.statistics.factorizations <= run.statistics.projections / 2);
-  // Twenty looks at whether F keeps a row, of twelve evaluations each, and a few more.
-  CHECK(run.statistics.value_evaluations <= run.statistics.iterations + 20 * 12 + 20);
+  // Forty looks at whether F keeps a row, of twelve evaluations each.
+  CHECK(run.statistics.value_evaluations <= run.statistics.iterations + 40 * 12);
   CHECK(run.message.empty());
 }
 

@@ -165,7 +165,7 @@ double rate_by_nearly_dependent_rows(int points) {
   const Candidate candidate = at.candidate(1e-12);
   REQUIRE(mover->rows().set_algebraic(candidate, nullptr) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::success);
-  CHECK(mover->finish(candidate, false) == Status::success);
+  CHECK(mover->finish(candidate) == Status::success);
   const auto y = [&](int i) { return candidate.base_entries[i] + candidate.correction_entries[i]; };
   return std::abs(y(0) * y(2 * points) + y(1) * y(2 * points + 1));
 }

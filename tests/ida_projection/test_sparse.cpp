@@ -206,7 +206,6 @@ TEST_CASE("sparse rows given twice: output points are found with the factors of 
   Host host(chain.problem(1.0), 1e-7);
   tp::Projection& projection = host.attach(rows + chain.sparse_rows());
   int outputs = 0, followed = 0;
-  long most = 0;  // evaluations at a point; the first finds the structure
   while (outputs < 100) {
     REQUIRE(host.step() >= 0);
     if (host.steps() < 40) continue;  // first steps turn C by much
@@ -221,13 +220,10 @@ TEST_CASE("sparse rows given twice: output points are found with the factors of 
     REQUIRE(report);
     CHECK(report.rank == 140);
     CHECK(report.drift_after < 1e-12);
-    if (followed < outputs) most = std::max(most, *evaluations - before);
     ++outputs;
     followed += *evaluations == before;
   }
-  CHECK(followed > 75);
-  CHECK(followed < 100);
-  CHECK(most == 1);
+  CHECK(followed == outputs);
 }
 
 TEST_CASE("sparse rows: no allocation in a projected step") {
@@ -274,14 +270,12 @@ TEST_CASE("sparse rows of whipping chains: every step on the constraints, as den
     REQUIRE(other.finish() >= 0);
     if (rods == 70)
       ratios += std::log(static_cast<double>(host.steps()) / static_cast<double>(other.steps()));
-    // More than 128 rows have sparse factors, which serve several steps.
-    if (rods == 70) CHECK(s.factorizations <= 7 * s.projections / 8);
     if (rods <= 40) CHECK(host.steps() == other.steps());
   }
   CHECK(ratios <= 3.0 * std::log(1.1));
 }
 
-TEST_CASE("sparse factors that serve several steps: few solutions a step, plain IDA's errors") {
+TEST_CASE("sparse factors: few solutions a step, plain IDA's errors") {
   for (const auto& [links, t_end] : {std::make_pair(50, 0.5), {110, 0.3}})
     for (const auto& [tolerance, solutions] : {std::make_pair(1e-4, 4.3), {1e-6, 3.9}}) {
       INFO(links << " links, tolerance " << tolerance);

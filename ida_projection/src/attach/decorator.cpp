@@ -242,7 +242,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   const Fix after = polishes ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
   moved.corrector_was_right = after.corrector_was_right;
   moved.status = after.made ? movers_.used->settle(candidate, polish_.delta())
-                            : movers_.used->finish(candidate, before.made && !polishes);
+                            : movers_.used->finish(candidate);
   return moved;
 }
 

@@ -35,7 +35,6 @@ void Projection::Impl::find_linear_solver_kind() {
     options_.advanced.metric =
         iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;
   polish_.note_linear_solver(iterative);
-  movers_.used->rows().expect_no_settle(iterative);
 }
 
 // Readable through message() as long as nothing else is wrong.

@@ -4,8 +4,9 @@
 
 #include <cstddef>
 #ifdef TETHER_ABLATION
+#include <array>
 #include <cstdlib>
-#include <cstring>
+#include <string>
 #endif
 
 namespace tether::ida_projection {
@@ -24,8 +25,6 @@ enum class Mechanism {
   tested_long_moves,      ///< the error test sees the correction before a long move, too
   row_trust,              ///< thin rows count only as far as C can be trusted
   kept_rank,              ///< which rows are independent is found out now and then
-  kept_factors,           ///< factors of many sparse rows serve several steps
-  one_pass_move,          ///< few independent rows are factored and solved in one pass
   looks,                  ///< rows that need no move are only evaluated
   rate_limit,             ///< scales of positions are at most h times those of velocities
   other_metric,           ///< one scale for each level, where stiff components respond to moves
@@ -46,8 +45,6 @@ inline constexpr const char* kMechanismNames[] = {"repeated correction",
                                                   "tested long moves",
                                                   "row trust",
                                                   "kept rank",
-                                                  "kept factors",
-                                                  "one-pass move",
                                                   "looks",
                                                   "rate limit",
                                                   "other metric",
@@ -58,11 +55,18 @@ static_assert(sizeof kMechanismNames / sizeof *kMechanismNames ==
               static_cast<std::size_t>(Mechanism::count));
 
 #ifdef TETHER_ABLATION
-/// The environment variable TETHER_WITHOUT names one that is not.
+/// Those in use: all but what the environment variable TETHER_WITHOUT names, with commas between.
+inline std::array<bool, static_cast<std::size_t>(Mechanism::count)> mechanisms_in_use() {
+  const char* const names = std::getenv("TETHER_WITHOUT");
+  const std::string without = "," + std::string(names != nullptr ? names : "") + ",";
+  std::array<bool, static_cast<std::size_t>(Mechanism::count)> used{};
+  for (std::size_t i = 0; i < used.size(); ++i)
+    used[i] = without.find("," + std::string(kMechanismNames[i]) + ",") == std::string::npos;
+  return used;
+}
 inline bool in_use(Mechanism mechanism) {
-  static const char* const without = std::getenv("TETHER_WITHOUT");
-  return without == nullptr ||
-         std::strcmp(without, kMechanismNames[static_cast<std::size_t>(mechanism)]) != 0;
+  static const auto used = mechanisms_in_use();
+  return used[static_cast<std::size_t>(mechanism)];
 }
 #else
 constexpr bool in_use(Mechanism) { return true; }

@@ -31,12 +31,4 @@ class Curvature {
   double measured_ = 0.0;  // longest distance at which it was looked for
 };
 
-/// Factors of an earlier step leave the part slope * age of a move, age in candidates.
-struct WearOfFactors {
-  static constexpr double kUnknown = 0.03;  // where nothing is known yet
-  double slope = kUnknown;
-  int age = 0;
-  double rate() const { return slope * age; }
-};
-
 }  // namespace tether::ida_projection

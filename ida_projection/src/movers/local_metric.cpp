@@ -66,19 +66,6 @@ void LocalMetric::use_groups(LoadedCandidate& at, Block& d, Block& a) {
   }
 }
 
-void LocalMetric::fill_few(const LoadedCandidate& at, int first, int columns,
-                           double* __restrict D) {
-  double* __restrict trial = trial_scale_.data() + first;
-  const double* __restrict scale = scale_.data() + first;
-  const double* __restrict w = at.w + first;
-  const double* __restrict ycor = at.ycor + first;
-  for (int k = 0; k < columns; ++k) {
-    const double s = std::max(kMetricDecay * scale[k], std::abs(ycor[k]));
-    trial[k] = s;
-    D[k] = std::max(s, kMetricFloor * (w[k] > 0.0 ? 1.0 / w[k] : s));
-  }
-}
-
 // Errors of positions are h times those of velocities. Corrections do not show that in the short
 // steps of a start, where those of positions are the quadratic part of the motion that the next
 // order will have: then errors of velocities are repaired by sliding positions along, and where

@@ -22,13 +22,6 @@ class LocalMetric {
   /// The same, and D of both blocks of rows: s or, where the error weights are asked for, WT.
   template <class Block>
   void fill(LoadedCandidate& at, Block& d, Block& a);
-  /// fill() where rows are few, one block has them all and its columns are adjacent; the same D.
-  void fill_few(const LoadedCandidate& at, int first, int columns, double* __restrict D);
-  /// Is D made of each component's own s?
-  bool plain() const {
-    return options_.advanced.metric == Metric::local_correction && levels_.empty() &&
-           options_.group.empty();
-  }
   /// D of every component, by the candidate that look() or fill() saw last.
   void current(const LoadedCandidate& at, double* D) const;
   /// One scale for each of these groups, in place of Options::group.

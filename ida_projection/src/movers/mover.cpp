@@ -11,23 +11,15 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kNothing = 1e-8;      // tolerances: as good as no move
-constexpr double kLargestFloor = 0.1;  // tolerances
-constexpr double kLong = 1.0;          // tolerances: such a move is made with fresh factors
-// Factors of an earlier step leave at most so much for settle(), in tolerances.
-constexpr double kLeftForSettle = 0.1;
+constexpr double kNothing = 1e-8;         // tolerances: as good as no move
+constexpr double kLargestFloor = 0.1;     // tolerances
 constexpr double kStaleRowsSafety = 4.0;  // by so much C of an earlier step may mislead
 constexpr int kMostTests = 16;            // looks with the factors of one
 constexpr int kUnneededMoves = 8;         // moves that were none, then looks begin again
 constexpr int kUsualMoves = 3;            // moves with a whole C
 // This part of Options::tolerance is left where a move costs little beside the factors.
 constexpr double kCheapRest = 1e-4;
-constexpr double kStaleShare =
-    0.25;  // of Options::tolerance, where stale factors tell what is left
-// Factors of an earlier step are used while they leave less than kWorn of a move. Above kSlow five
-// moves would not be enough.
-constexpr double kWorn = 0.06, kSlow = 0.1;
-constexpr double kHalving = 0.5;  // moves that leave more of each other do not converge
+constexpr double kLeft = 0.03;  // of a first move, where nothing is known yet
 
 }  // namespace
 
@@ -71,7 +63,7 @@ void Mover::reset() {
 
 Status Mover::factor(double t, bool refill) {
   const Status status = rows_->factor(t, refill);
-  if (status == Status::success) wear_ = WearOfFactors();
+  if (status == Status::success) age_ = 0;
   return status;
 }
 
@@ -88,7 +80,7 @@ bool Mover::clearly_needs_no_move() {
   if (!in_use(Mechanism::looks) || !rows_->may_test_with_factors() || tests_ >= kMostTests)
     return false;
   ++tests_;
-  ++wear_.age;
+  ++age_;
   return rows_->rounding_only() || kStaleRowsSafety * rows_->solve(Solve::test).length <= kNothing;
 }
 
@@ -129,29 +121,24 @@ bool Mover::needs_no_move_again(const Candidate& candidate, Move& result) {
   if (!still_) return false;
   result.drift_before = result.drift_after = rows_->drift();
   move_length_ = 0.0;
-  reused_ = false;
   return true;
 }
 
 Move Mover::move(const Candidate& candidate) {
   Move result;
   still_ = false;
-  by_present_factors_ = -1.0;
-  reused_ = rows_->keeps_factors() && rows_->has_factors();
-  result.status = rows_->load(candidate, !reused_ && nothing_in_row_ < kUnneededMoves);
+  result.status = rows_->load(candidate, nothing_in_row_ < kUnneededMoves);
   if (result.status != Status::success || needs_no_move_again(candidate, result)) return result;
-  ++wear_.age;
-  result.status = rows_->value(candidate.t, !reused_);
+  result.status = rows_->value(candidate.t, true);
   if (result.status != Status::success) return result;
   tests_ = 0;
   newton(candidate, result);
   const bool nothing = result.status == Status::success && result.length <= kNothing;
-  nothing_in_row_ = nothing && !rows_->keeps_factors() ? nothing_in_row_ + 1 : 0;
+  nothing_in_row_ = nothing ? nothing_in_row_ + 1 : 0;
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
   if (broken || result.moves > kUsualMoves) rows_->refresh_pattern_soon();
-  // Kept factors are in use only while dropped rows ask for less than that.
-  if (result.status == Status::success && !result.capped && !reused_ && rows_->contradicts())
+  if (result.status == Status::success && !result.capped && rows_->contradicts())
     result.status = Status::inconsistent;
   return result;
 }
@@ -160,38 +147,24 @@ Move Mover::move(const Candidate& candidate) {
 void Mover::newton(const Candidate& candidate, Move& result) {
   result.drift_before = result.drift_after = rows_->drift();
   monitor_.start();
-  bool renew = !reused_, refill = true, fresh = false;  // fresh: factors belong to the present y
+  bool renew = true;
   for (;;) {
-    if (renew && (result.status = factor(candidate.t, refill)) != Status::success) return;
-    fresh = fresh || renew;
+    const bool fresh = renew;  // the factors belong to the present y
+    if (renew && (result.status = factor(candidate.t, result.moves == 0)) != Status::success)
+      return;
     const Solution found = rows_->solve(renew ? Solve::first : Solve::again);
     if ((result.status = found.status) != Status::success) return;
-    renew = refill = false;
-    follows_ = found.follows;
-    if (reused_ && !(found.length <= kLong && found.follows)) {
-      reused_ = false;
-      renew = refill = true;
-      continue;
-    }
     if (++result.moves == 1) {
       result.length = move_length_ = found.length;
       if (!(found.length <= options_.advanced.largest_move) && !allowed(candidate, result)) return;
     }
     if ((result.status = rows_->apply(1.0, candidate)) != Status::success) return;
-    by_present_factors_ = found.length;
     if (!rows_->traits.gives_g) break;
-    if (reused_) {
-      if (2.0 * wear_.rate() * found.length <= kLeftForSettle) break;
-      reused_ = false;
-      renew = refill = true;
-    } else {
-      if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(found.length)) break;
-      Monitor::Verdict verdict = Monitor::Verdict::done;
-      if (done(candidate, found, fresh, result, verdict)) break;
-      if (result.status != Status::success) return;
-      fresh = false;
-      renew = verdict == Monitor::Verdict::refactor;
-    }
+    if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(found.length)) break;
+    Monitor::Verdict verdict = Monitor::Verdict::done;
+    if (done(candidate, found, fresh, result, verdict)) break;
+    if (result.status != Status::success) return;
+    renew = verdict == Monitor::Verdict::refactor;
     if ((result.status = rows_->value(candidate.t, false)) != Status::success) return;
     result.drift_after = rows_->drift();
   }
@@ -235,7 +208,6 @@ bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, 
     verdict = Monitor::Verdict::done;
   // One that answers nothing but rounding of g leads nowhere, however long it is.
   if (verdict == Monitor::Verdict::failed && rows_->rounding_only()) {
-    by_present_factors_ = -1.0;
     result.status = rows_->apply(-1.0, candidate);
     return result.status == Status::success;
   }
@@ -254,18 +226,13 @@ bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, 
 
 Status Mover::settle(const Candidate& candidate, N_Vector change) {
   const double moved = rows_->shift(change);
-  if (rows_->keeps_factors()) return remove_rest_with_kept_factors(candidate, -1.0);
   return remove_rest(candidate, move_length_ + moved);
 }
 
-Status Mover::finish(const Candidate& candidate, bool polished) {
-  if (still_ || !rows_->traits.gives_g) return Status::success;
+Status Mover::finish(const Candidate& candidate) {
   // Newton's method goes on where a move costs little beside the step.
-  if (rows_->traits.measures_rest) return remove_rest(candidate, move_length_);
-  if (!rows_->keeps_factors()) return Status::success;
-  const bool unseen = move_length_ > kStaleShare * options_.advanced.tolerance || !follows_;
-  return unseen ? remove_rest_with_kept_factors(candidate, polished ? by_present_factors_ : -1.0)
-                : Status::success;
+  const bool goes_on = !still_ && rows_->traits.measures_rest;
+  return goes_on ? remove_rest(candidate, move_length_) : Status::success;
 }
 
 // With factors that belong to a point `reach` tolerances away.
@@ -277,18 +244,18 @@ Status Mover::remove_rest(const Candidate& candidate, double reach) {
     Status status = rows_->value(candidate.t, false);
     if (status != Status::success) return status;
     Solution found = rows_->solve(Solve::rest);
-    if (still_ && wear_.age > 0 && found.length > kNothing) {
+    if (still_ && age_ > 0 && found.length > kNothing) {
       if ((status = factor(candidate.t, true)) != Status::success) return status;
       found = rows_->solve(Solve::first);
     }
     if (found.status != Status::success) return found.status;
     if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
-    if ((still_ && wear_.age > 0) || !rows_->traits.gives_g)
+    if ((still_ && age_ > 0) || !rows_->traits.gives_g)
       break;  // by next to nothing, which says nothing about its rate
     const double length = found.length;
     // Only what is seen on this candidate counts where moves are cheap.
-    const double expected = cheap ? length * (k > 0 ? length / previous : WearOfFactors::kUnknown)
-                                  : curvature_.left(reach, length);
+    const double expected =
+        cheap ? length * (k > 0 ? length / previous : kLeft) : curvature_.left(reach, length);
     const bool enough_done = (k > 0 || cheap || !measure) && expected <= enough;
     if (k == 0 && enough_done) break;
     const double floor = 1e2 * kEpsilon * rows_->size();
@@ -298,55 +265,6 @@ Status Mover::remove_rest(const Candidate& candidate, double reach) {
     previous = length;
   }
   return Status::success;
-}
-
-// The same with kept factors, which leave a part of each move that grows with their age. Only what
-// is seen on this candidate counts: a move shorter than the tolerance, or a part left, measured by
-// two moves with the same factors, that makes the next one so; and dropped rows that follow the
-// others. Where too much is left, also of dropped rows, or a move is long, C is refactorised.
-// `previous`: length of the move before, by the same factors and with nothing in between; < 0:
-// there is none.
-Status Mover::remove_rest_with_kept_factors(const Candidate& candidate, double previous) {
-  const double floor = 1e2 * kEpsilon * rows_->size();
-  const double done = std::max(floor, kStaleShare * options_.advanced.tolerance);
-  for (int k = 0; k <= options_.advanced.maximum_iterations; ++k) {
-    Status status = rows_->value(candidate.t, false);
-    if (status != Status::success) return status;
-    Solution found = rows_->solve(Solve::rest);
-    double part = previous > 0.0 && found.length > floor ? found.length / previous : 0.0;
-    if (part > 0.0 && wear_.age > 0 && k > 0) wear_.slope = part / wear_.age;
-    if (wear_.age > 0 &&
-        ((k > 0 && part > kSlow) || found.length > kLong || (k > 0 && !found.follows))) {
-      if ((status = factor(candidate.t, true)) != Status::success) return status;
-      found = rows_->solve(Solve::first);
-      part = 0.0;
-      previous = -1.0;
-    }
-    // Almost parallel rows magnify rounding: moves would follow it without end.
-    if (k > 0 && part > kHalving && rows_->rounding_only()) return Status::success;
-    // One solution leaves most of what rows ask for that nearly depend on the others.
-    if (k > 0 && part > kHalving && wear_.age == 0) {
-      found.length = rows_->solve(Solve::closely).length;
-      part = 0.0;
-    }
-    if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
-    // The first of two moves may have been left less of than what remains then would be.
-    const double leaves = k > 0 ? part : std::max(part, wear_.rate());
-    const double length = found.length;
-    if (found.follows &&
-        (length <= done ||
-         (part > 0.0 && leaves * length <= kStaleShare * options_.advanced.tolerance))) {
-      if (k > 0 && part > kWorn) rows_->forget_factors();
-      return Status::success;
-    }
-    previous = length;
-  }
-  rows_->forget_factors();
-  if (previous <= std::min(kLargestFloor, rows_->rounding_length())) return Status::success;
-  rows_->message = "after " + std::to_string(options_.advanced.maximum_iterations) +
-                   " moves with kept factors the next one still is " + brief(previous) +
-                   " tolerances long (Options::maximum_iterations)";
-  return Status::not_converged;
 }
 
 std::unique_ptr<Mover> make_vector_mover(const Constraints& constraints, const Options& options,

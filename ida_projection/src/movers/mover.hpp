@@ -89,13 +89,13 @@ class Mover {
   /// The correction was changed by `change` after a successful move(): takes back what leaves the
   /// constraints, with the current factors.
   Status settle(const Candidate& candidate, N_Vector change);
-  /// No settle() follows the last move(): completes it. `polished`: so the candidate was before it.
-  Status finish(const Candidate& candidate, bool polished);
+  /// No settle() follows the last move(): completes it.
+  Status finish(const Candidate& candidate);
   /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
   double remaining_drift(const Candidate& candidate);
   /// RowsAt::tangency(), unless C is that of an earlier candidate.
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) {
-    return wear_.age == 0 && rows_->tangency(yp, id, out);
+    return age_ == 0 && rows_->tangency(yp, id, out);
   }
 
  private:
@@ -107,21 +107,16 @@ class Mover {
   bool done(const Candidate& candidate, const Solution& solution, bool fresh, Move& result,
             Monitor::Verdict& verdict);
   Status remove_rest(const Candidate& candidate, double reach);
-  Status remove_rest_with_kept_factors(const Candidate& candidate, double previous);
 
   const Options& options_;
   Monitor monitor_;
   std::unique_ptr<RowsAt> rows_;
   double move_length_ = 0.0;  // of the last first move, in tolerances
-  bool follows_ = true;       // dropped rows, at the last solution
-  // Length of the last move, if the current factors made it; < 0: others did.
-  double by_present_factors_ = -1.0;
-  bool reused_ = false;     // factors of an earlier step are in use for this one
-  WearOfFactors wear_;      // of the current factors
-  int tests_ = 0;           // with the factors of an earlier candidate
-  int nothing_in_row_ = 0;  // moves that were none
-  bool still_ = false;      // the last candidate was only looked at
-  Curvature curvature_;     // for what a polish moves
+  int age_ = 0;               // of the factors, in candidates
+  int tests_ = 0;             // with the factors of an earlier candidate
+  int nothing_in_row_ = 0;    // moves that were none
+  bool still_ = false;        // the last candidate was only looked at
+  Curvature curvature_;       // for what a polish moves
   long settles_ = 0;
 };
 

@@ -29,11 +29,10 @@ struct Solution {
 
 /// The purpose of a solution.
 enum class Solve {
-  first,    ///< the factors are new: which of the rows are to be trusted is decided
-  again,    ///< the same rows as before
-  rest,     ///< what a move or a polish has left
-  closely,  ///< as closely as nearly dependent rows can be solved
-  test      ///< no move follows
+  first,  ///< the factors are new: which of the rows are to be trusted is decided
+  again,  ///< the same rows as before
+  rest,   ///< what a move or a polish has left
+  test    ///< no move follows
 };
 
 /// g, C and its factors in one storage, for the candidate that was loaded last. Newton's loop asks
@@ -81,9 +80,6 @@ class RowsAt {
   virtual double drift() const = 0;
 
   virtual bool has_factors() const = 0;
-  virtual void forget_factors() = 0;
-  /// May factors of a step serve the next ones, and do those at hand?
-  virtual bool keeps_factors() const { return false; }
   /// May they tell that there is nothing to move?
   virtual bool may_test_with_factors() const { return has_factors(); }
   /// Was it found out for this candidate which rows are independent?
@@ -103,8 +99,6 @@ class RowsAt {
   /// The attempt that used the last candidate was accepted: its scale is kept.
   virtual void accept() {}
   virtual void reset() = 0;
-  /// Will no polish be taken back in this run? Then factors may serve more than one step.
-  virtual void expect_no_settle(bool) {}
   /// One scale for all unknowns of a level (row_levels.hpp) from the next move on, or each its own
   /// again. False: nothing changes, there are too few rows or levels.
   virtual bool use_levels(bool) { return false; }

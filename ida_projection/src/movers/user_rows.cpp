@@ -57,7 +57,6 @@ class UserRows final : public RowsAt {
   void restart(const Candidate&) override {}
   double drift() const override { return 0.0; }
   bool has_factors() const override { return false; }
-  void forget_factors() override {}
   bool contradicts() override { return false; }
   Status set_algebraic(const Candidate&, N_Vector) override { return Status::success; }
   void reset() override {}

@@ -19,6 +19,7 @@ struct BlockOf {
   std::vector<int> rows, columns;
   Solver solver;
   std::vector<double> g, dy;
+  double least_independent = 1.0;  // sine of the angle of a row with those before it
   int first = -1;  // of columns that follow each other without a gap; -1: they do not
 
   /// After rows, columns and the solver were set up.

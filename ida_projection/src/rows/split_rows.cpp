@@ -89,9 +89,6 @@ void SplitRows<Solver>::rearrange() {
   set_up(d, &gather_d_);
   set_up(a, &gather_a_);
   moved_.assign(a.rows.empty() ? 0 : at(n_), 0.0);
-  few_ = kDense && !many(m_) &&
-         static_cast<int>(d.columns.size()) <= linalg::MinimumNorm::kSmallColumns &&
-         a.rows.empty() && d.first >= 0 && static_cast<int>(d.rows.size()) == m_;
   watch();
 }
 
@@ -231,7 +228,11 @@ bool SplitRows<Solver>::factor(Block& block, const std::vector<int>& gather) {
       double* row = block.solver.full_row(k - sparse);
       block.for_columns([=](int c, int j) { row[c] = from[j]; });
     }
-    return block.solver.factor(rank_tolerance_);
+    if (!block.solver.factor(rank_tolerance_)) return false;
+    block.least_independent = 1.0;
+    for (int i = 0; i < block.solver.rows(); ++i)
+      block.least_independent = std::min(block.least_independent, block.solver.independent_part(i));
+    return true;
   }
 }
 
@@ -258,7 +259,9 @@ void SplitRows<Solver>::solve_block(Block& block, double solved) {
   if constexpr (kDense)
     block.solver.solve(block.g.data(), block.dy.data());
   else
-    block.solver.solve(block.g.data(), block.dy.data(), solved);
+    block.solver.solve(
+        block.g.data(), block.dy.data(),
+        std::max(solved * block.least_independent, linalg::SparseMinimumNorm::kTolerance));
 }
 
 template <class Solver>

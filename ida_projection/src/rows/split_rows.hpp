@@ -46,9 +46,7 @@ class SplitRows {
  public:
   using Block = BlockOf<Solver>;
   static constexpr bool kDense = std::is_same_v<Solver, linalg::MinimumNorm>;
-  /// Sparse C and its factors cost four solves and more: they serve several steps. Dense factors of
-  /// the rows that an earlier step has kept are so cheap that none serve two steps.
-  static constexpr bool kKeepsFactors = !kDense;
+  static constexpr bool kSparse = !kDense;
   /// Dense factors of rows that are known to be independent cost half of an orthogonal
   /// factorisation, and a tenth where rows are many.
   static constexpr bool kKeepsRank = kDense;
@@ -91,19 +89,7 @@ class SplitRows {
   /// The same for sparse rows by one step with the regularised factors, where the next solve takes
   /// the rest.
   void solve_roughly(const std::vector<double>& g) { solve_to(g, 1.0); }
-  /// The same as closely as they can be solved.
-  void solve_closely(const std::vector<double>& g) {
-    solve_to(g, linalg::SparseMinimumNorm::kTolerance);
-  }
   int rank() const { return d.solver.rank() + a.solver.rank(); }
-  /// Are these few rows over adjacent columns, none of them for algebraic variables?
-  bool few() const { return few_; }
-  /// factor_kept() of them.
-  bool factor_kept_few() {
-    if constexpr (kDense)
-      return d.solver.factor_kept(C_.values().data(), n_, d.rows.data(), d.columns.data());
-    return false;
-  }
   /// The rows whose move is measured in tolerances.
   Block& counted() { return d.rows.empty() ? a : d; }
   /// After a move of this length with the C at hand: C at y, where it is time to learn from it.
@@ -130,7 +116,9 @@ class SplitRows {
   std::string message;
 
  private:
-  static constexpr double kSolved = 1e-6;  // of g: Newton's next move takes the rest
+  /// Of a move: Newton's next one takes the rest. Of g it is as much less as the factors say that
+  /// rows depend on each other.
+  static constexpr double kSolved = 1e-6;
 
   Status find_seen(Evaluator& evaluator, double t, const std::vector<double>& y,
                    const std::vector<double>& WT);
@@ -156,7 +144,6 @@ class SplitRows {
   PatternRefresh refresh_;
   bool outgrown_ = false;
   bool structured_ = false;
-  bool few_ = false;
 };
 
 using DenseRows = SplitRows<linalg::MinimumNorm>;

@@ -121,29 +121,15 @@ Status ContiguousRows<Rows>::rows(double t, double* g) {
   return told(status);
 }
 
-// Few rows that are known to be independent take a metric and factors of their own, with the same
-// numbers.
 template <class Rows>
 Status ContiguousRows<Rows>::factor(double t, bool refill) {
-  const bool few = refill && Rows::kThinRows && in_use(Mechanism::one_pass_move) && uses_.lasting &&
-                   uses_.there && !blocks_.dropped_rows() && blocks_.few() && metric_.plain();
-  if (refill && !few) fill_metric();
+  if (refill) fill_metric();
   if (!rows_known_) {
     const Status status = rows(t, nullptr);
     if (status != Status::success) return status;
   }
   rows_known_ = false;
   t_ = t;
-  if (few && uses_.there) {
-    metric_.fill_few(at_, blocks_.d.first, static_cast<int>(blocks_.d.columns.size()),
-                     blocks_.d.D());
-    if (blocks_.factor_kept_few()) {
-      uses_.thin = uses_.foreign = false;
-      ++statistics_.refactorizations;
-      return Status::success;
-    }
-    fill_metric();
-  }
   factored_ = std::min(factored_ + 1, kEarly + 1);
   const bool known =
       in_use(Mechanism::kept_rank) && Rows::kKeepsRank && uses_.lasting && uses_.there;
@@ -191,10 +177,7 @@ double ContiguousRows<Rows>::length_of_solution() {
 template <class Rows>
 Solution ContiguousRows<Rows>::solve(Solve how) {
   Solution found;
-  if (how == Solve::closely)
-    blocks_.solve_closely(g_);
-  else
-    blocks_.solve(g_);
+  blocks_.solve(g_);
   found.length = length_of_solution();
   if (how == Solve::test) --statistics_.iterations;
   if (how == Solve::first && uses_.thin) {
@@ -216,7 +199,7 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
     }
   }
   // A polish moves few rows by too little to tell.
-  const bool tells = how != Solve::rest || Rows::kKeepsFactors || traits.measures_rest;
+  const bool tells = how != Solve::rest || Rows::kSparse || traits.measures_rest;
   found.follows = !tells || dropped_follow();
   if (!found.follows && Rows::kKeepsRank) {
     uses_.lasting = false;

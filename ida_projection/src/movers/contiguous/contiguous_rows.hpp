@@ -28,7 +28,7 @@ class ContiguousRows final : public RowsAt {
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, int reported)
       : RowsAt({true, Rows::many(constraints.total_count()),
-                constraints.total_count() > kFewForLevels || Rows::kKeepsFactors}),
+                constraints.total_count() > kFewForLevels || Rows::kSparse}),
         evaluator_(constraints, statistics),
         blocks_(constraints, evaluator_, size),
         at_(size),
@@ -55,18 +55,13 @@ class ContiguousRows final : public RowsAt {
   void restart(const Candidate&) override { at_.restart(); }
   double drift() const override;
   bool has_factors() const override { return uses_.there; }
-  void forget_factors() override { uses_.there = false; }
-  bool keeps_factors() const override {
-    return in_use(Mechanism::kept_factors) && Rows::kKeepsFactors && uses_.lasting;
-  }
   bool may_test_with_factors() const override {
     return uses_.there && !uses_.thin && !blocks_.dropped_rows();
   }
   bool decided() const override { return uses_.decided; }
   void forget_rank() override { uses_.lasting = false; }
-  // Stale factors leave more of what dropped rows ask for.
   bool may_polish_first() const override {
-    return Rows::kKeepsFactors ? !blocks_.dropped_rows() : traits.measures_rest;
+    return Rows::kSparse ? !blocks_.dropped_rows() : traits.measures_rest;
   }
   bool contradicts() override;
   void refresh_pattern_soon() override { blocks_.refresh_pattern_soon(); }

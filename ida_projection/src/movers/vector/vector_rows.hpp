@@ -45,7 +45,6 @@ class VectorRows final : public RowsAt {
   Status value(double t, bool) override {
     return fatal_ ? Status::callback_fatal : told(rows_.value(t, y_));
   }
-  // Error weights change slowly, and so do factors in their metric.
   Status factor(double t, bool refill) override {
     if (refill) metric_.set(at_, dy_);
     factored_ = false;
@@ -86,10 +85,6 @@ class VectorRows final : public RowsAt {
   }
   double drift() const override { return rows_.drift(); }
   bool has_factors() const override { return factored_; }
-  void forget_factors() override { factored_ = false; }
-  bool keeps_factors() const override {
-    return no_settle_ && !metric_.local() && may_test_with_factors();
-  }
   bool may_test_with_factors() const override { return factored_ && rows_.whole(); }
   bool contradicts() override {
     if (!rows_.contradict(dy_)) return false;
@@ -122,7 +117,6 @@ class VectorRows final : public RowsAt {
     metric_.reset();
     factored_ = moves_ = false;
   }
-  void expect_no_settle(bool none) override { no_settle_ = none; }
   bool fatal() const override { return fatal_; }
   void forget_failure() override { fatal_ = false; }
 
@@ -145,8 +139,7 @@ class VectorRows final : public RowsAt {
   VectorMetric metric_;
   Store rows_;
   bool factored_ = false, fatal_ = false;
-  bool moves_ = false;  // have begun in this run
-  bool no_settle_ = false;
+  bool moves_ = false;            // have begun in this run
   N_Vector id_ = nullptr;         // the caller's of set_algebraic()
   bool holds_algebraic_ = false;  // no row has contained one so far
 };
