@@ -18,7 +18,7 @@ using namespace tether;
 
 namespace {
 
-constexpr double kTolerances[] = {1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8};
+double tolerances[] = {1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8};
 // Runs that get stuck end: the longest ones that do not take 18 141 steps, and 2375 of large
 // problems.
 constexpr long kMostSteps = 20000, kMostStepsOfLarge = 3000;
@@ -76,10 +76,14 @@ int main(int argc, char** argv) {
       if (only[1] == option.name) option.off(options);
     only.erase(only.begin(), only.begin() + 2);
   }
+  if (only.size() > 1 && only[0] == "--times") {
+    for (double& tolerance : tolerances) tolerance *= std::stod(only[1]);
+    only.erase(only.begin(), only.begin() + 2);
+  }
   fmt::print("problem,form,tolerance,class,steps,F,error,failed\n");
   for (const bench::Case& which : bench::selected(bench::catalogue(), only, {"long pendulum"}))
     for (const problems::Problem& form : which.forms)
-      for (const double tolerance : kTolerances)
+      for (const double tolerance : tolerances)
         if (form.index <= 2) run(which.name, form, tolerance, options, size_class(form.size));
   if (!only.empty()) return 0;
   for (const int links : {20, 50, 200})
@@ -87,8 +91,8 @@ int main(int argc, char** argv) {
       run(fmt::format("chain of {}", links), problems::link_chain(links, links < 100 ? 0.5 : 0.2),
           tolerance, options, "big");
   for (const problems::Problem& other : bench::others())
-    for (const double tolerance : kTolerances) run(other.name, other, tolerance, options, "others");
+    for (const double tolerance : tolerances) run(other.name, other, tolerance, options, "others");
   for (const problems::Problem& chain : bench::chains_of_rods())
-    for (const double tolerance : kTolerances)
+    for (const double tolerance : tolerances)
       if (tolerance >= kTightestOfRods) run(chain.name, chain, tolerance, options, "rods");
 }

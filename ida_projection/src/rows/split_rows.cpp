@@ -218,7 +218,7 @@ bool SplitRows<Solver>::factor(Block& block, const std::vector<int>& gather) {
   if (block.rows.empty()) return true;
   if constexpr (kDense)
     return block.solver.factor(C_.values().data(), n_, block.rows.data(), block.columns.data(),
-                               rank_tolerance_, C_.places());
+                               rank_tolerance_);
   else {
     double* to = block.solver.entries();
     for (std::size_t k = 0; k < gather.size(); ++k) to[k] = C_.values()[at(gather[k])];
@@ -247,7 +247,7 @@ bool SplitRows<Solver>::factor_kept() {
     for (Block* block : {&d, &a})
       if (!block->rows.empty() &&
           !block->solver.factor_kept(C_.values().data(), n_, block->rows.data(),
-                                     block->columns.data(), C_.places()))
+                                     block->columns.data()))
         return false;
     return true;
   }

@@ -116,8 +116,8 @@ class SplitRows {
   std::string message;
 
  private:
-  /// Of a move: Newton's next one takes the rest. Of g it is as much less as the factors say that
-  /// rows depend on each other.
+  /// Part of a move that a solution may leave: Newton's next one takes it. The same part of g is
+  /// as much less as the factors say that rows depend on each other.
   static constexpr double kSolved = 1e-6;
 
   Status find_seen(Evaluator& evaluator, double t, const std::vector<double>& y,

@@ -5,22 +5,12 @@
 #include <cstdint>
 #include <cstring>
 #include <tether/linalg/index.hpp>
-#include <tether/linalg/minimum_norm.hpp>
 
 namespace tether::ida_projection {
 
-namespace {
-
 using linalg::at;
 
-constexpr double kFewPlaces = 4.0;  // times as many entries as places are worth their lists
-
-}  // namespace
-
-StoredRows::StoredRows(const Evaluator& evaluator, int n, bool sparse)
-    : n_(n),
-      sparse_(sparse),
-      by_places_(!sparse && evaluator.rows() > linalg::MinimumNorm::kSmallRows) {
+StoredRows::StoredRows(const Evaluator& evaluator, int n, bool sparse) : n_(n), sparse_(sparse) {
   for (const Evaluator::Part& part : evaluator.parts())
     if (sparse && part.sparse != nullptr)
       columns_.insert(columns_.end(), part.sparse->columns.begin(), part.sparse->columns.end());
@@ -35,7 +25,6 @@ StoredRows::StoredRows(const Evaluator& evaluator, int n, bool sparse)
     }
   values_.assign(at(first_full), 0.0);
   seen_.assign(values_.size(), 0);
-  if (by_places_) places_.resize(rows(), n);
 }
 
 Status StoredRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
@@ -43,24 +32,8 @@ Status StoredRows::evaluate(Evaluator& evaluator, double t, const double* y, con
   if (sparse_)
     return evaluator.entries(t, y, n_, WT, columns, values_.data(),
                              values_.data() + columns_.size(), g);
-  return evaluate_full(evaluator, t, y, WT, columns, g);
-}
-
-// Many rows are mostly zero: only what was ever filled is made zero again. What a callback that
-// failed has left is not known.
-Status StoredRows::evaluate_full(Evaluator& evaluator, double t, const double* y, const double* WT,
-                                 const std::vector<int>& columns, double* g) {
-  if (zero_elsewhere_)
-    places_.clear_all(values_.data());
-  else
-    std::fill(values_.begin(), values_.end(), 0.0);
-  zero_elsewhere_ = false;
-  const Status status = evaluator.jacobian_into_zeros(t, y, n_, WT, columns, values_.data(), g);
-  if (!by_places_ || status != Status::success) return status;
-  places_.note_all(values_.data());
-  zero_elsewhere_ = by_places_ =
-      kFewPlaces * static_cast<double>(places_.known()) <= static_cast<double>(values_.size());
-  return status;
+  std::fill(values_.begin(), values_.end(), 0.0);
+  return evaluator.jacobian_into_zeros(t, y, n_, WT, columns, values_.data(), g);
 }
 
 void StoredRows::notice_all() {

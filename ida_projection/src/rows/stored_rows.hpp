@@ -1,7 +1,6 @@
 // Tether: C with its pattern. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/linalg/filled.hpp>
 #include <vector>
 
 #include "constraints/evaluator.hpp"
@@ -23,22 +22,16 @@ class StoredRows {
   const std::vector<double>& values() const { return values_; }
   /// The entries of row i.
   const double* entries(int i) const { return values_.data() + row(i).begin; }
-  /// Those of full rows that were ever filled, where these are few; null: not known.
-  const linalg::FilledPlaces* places() const { return zero_elsewhere_ ? &places_ : nullptr; }
-
   /// f(column, entry) for the entries of row i; of full rows for those that are not zero.
   template <class Visit>
   void visit(int i, Visit f) const {
     const Row& at = row(i);
     const double* c = values_.data() + at.begin;
-    if (!at.full) {
-      for (int e = 0; e < at.count; ++e) f(columns_[static_cast<std::size_t>(at.begin + e)], c[e]);
-    } else if (!zero_elsewhere_) {
-      linalg::visit_filled(c, n_, f);
-    } else {
-      for (const int *j = places_.begin(i), *last = places_.end(i); j != last; ++j)
-        if (c[*j] != 0.0) f(*j, c[*j]);
-    }
+    for (int e = 0; e < at.count; ++e)
+      if (!at.full)
+        f(columns_[static_cast<std::size_t>(at.begin + e)], c[e]);
+      else if (c[e] != 0.0)
+        f(e, c[e]);
   }
   /// f(column, entry of values(), was it ever seen not to be zero?) for each place of row i.
   template <class Visit>
@@ -68,18 +61,12 @@ class StoredRows {
     bool full;
   };
   const Row& row(int i) const { return rows_[static_cast<std::size_t>(i)]; }
-  Status evaluate_full(Evaluator& evaluator, double t, const double* y, const double* WT,
-                       const std::vector<int>& columns, double* g);
-
   int n_;
   bool sparse_;
   std::vector<Row> rows_;
   std::vector<int> columns_;    // of the entries of sparse rows, which come first
   std::vector<double> values_;  // C
   std::vector<char> seen_;      // not to be zero, or not to be constant
-  // While all rows are full:
-  linalg::FilledPlaces places_;
-  bool by_places_, zero_elsewhere_ = false;
 };
 
 }  // namespace tether::ida_projection

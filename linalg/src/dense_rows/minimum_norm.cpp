@@ -1,11 +1,10 @@
 // Tether: minimum-norm solution of C dy = g in a diagonal metric.
 // SPDX-License-Identifier: BSD-3-Clause
-#include <numeric>
+#include <Eigen/Dense>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
 
-#include "large_rows.hpp"
 #include "small_kept_rows.hpp"
 #include "small_orthogonal.hpp"
 
@@ -14,11 +13,43 @@ namespace tether::linalg {
 namespace {
 
 constexpr double kLeastShare = 1.0 / 3.0;  // of factor_kept()
-// Entries of C above which A A^T is tried first: the orthogonal factorisation goes through a matrix
-// that no longer fits into fast memory once for each row.
-constexpr double kMany = 262144.0;
+// Factors of A A^T determine the square of a larger sine to a relative error of 1e-10.
+constexpr double kLeastSine = 1e-3;
 
 }  // namespace
+
+// Factors of more rows than small_orthogonal.hpp takes: A^T P = Q R, or A A^T = L L^T of the rows
+// that take part.
+struct MinimumNorm::Large {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  // Returns the least L_kk of the first `rank` rows of A; 0 where A A^T is not positive definite.
+  double factor(int rank) {
+    double least = 1.0;
+    for (int k = 0; k < rank; ++k) {
+      for (int j = 0; j < k; ++j)
+        L(k, j) = (A.row(k).dot(A.row(j)) - L.row(k).head(j).dot(L.row(j).head(j))) / L(j, j);
+      const double square = A.row(k).squaredNorm() - L.row(k).head(k).squaredNorm();
+      if (!(square > 0.0)) return 0.0;
+      L(k, k) = std::sqrt(square);
+      least = std::min(least, L(k, k));
+    }
+    return least;
+  }
+  // Overwrites z with (A A^T)^-1 z over the first `rank` rows.
+  template <class Vector>
+  void solve(int rank, Vector&& z) const {
+    const auto factor = L.topLeftCorner(rank, rank).triangularView<Eigen::Lower>();
+    factor.solveInPlace(z);
+    factor.transpose().solveInPlace(z);
+  }
+
+  Rows A;  // unit rows; of factor_kept() in pivot order
+  Rows L;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  Eigen::VectorXd work, rhs;
+  std::vector<int> order;  // pivot order
+};
 
 MinimumNorm::MinimumNorm() = default;
 MinimumNorm::MinimumNorm(int rows, int columns) { resize(rows, columns); }
@@ -52,20 +83,10 @@ void MinimumNorm::resize(int rows, int columns) {
     large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
     large_->work.resize(std::max(rows, columns));
     large_->rhs.resize(std::max(rows, columns));
-    large_->kept.resize(rows, columns);
+    large_->L.resize(rows, rows);
     large_->order.assign(m, 0);
-    large_->to_unit.assign(m, 1.0);
-    large_->split = false;
-    if (splits()) {
-      large_->natural.resize(m);
-      std::iota(large_->natural.begin(), large_->natural.end(), 0);
-      large_->rest.resize(rows, columns);
-      large_->left.resize(rows);
-    }
   }
 }
-
-bool MinimumNorm::splits() const { return static_cast<double>(m_) * n_ > kMany; }
 
 void MinimumNorm::set_rank(int rank) {
   rank_ = factored_rank_ = rank;
@@ -85,12 +106,8 @@ bool MinimumNorm::factor(const double* D, double rank_tolerance) {
   set_rank(0);
   kept_ = false;
   if (kernel_ == nullptr) {
-    large_->split = false;
-    if (!scale_large()) return false;
-    if (splits()) {
-      large_->kept.load(large_->A.data());
-      if (factor_split(rank_tolerance)) return true;
-    }
+    for (int i = 0; i < m_; ++i)
+      if (!scale_large(i, i)) return false;
     return factor_orthogonal(rank_tolerance);
   }
   if (!kernel_->form_rows(*small_, m_, metric_.data())) return false;
@@ -99,7 +116,7 @@ bool MinimumNorm::factor(const double* D, double rank_tolerance) {
 }
 
 bool MinimumNorm::factor(const double* wide, int width, const int* rows, const int* columns,
-                         double rank_tolerance, const FilledPlaces* places) {
+                         double rank_tolerance) {
   set_rank(0);
   kept_ = false;
   if (kernel_ != nullptr) {
@@ -108,84 +125,57 @@ bool MinimumNorm::factor(const double* wide, int width, const int* rows, const i
     set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
     return true;
   }
-  large_->split = false;
-  if (splits()) {
-    if (!large_->kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data(), places))
-      return false;
-    if (factor_split(rank_tolerance)) return true;
+  for (int i = 0; i < m_; ++i) {
+    gather_large(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, i);
+    if (!scale_large(i, i)) return false;
   }
-  gather_large(wide, width, rows, columns);
-  return scale_large() && factor_orthogonal(rank_tolerance);
+  return factor_orthogonal(rank_tolerance);
 }
 
-void MinimumNorm::gather_large(const double* wide, int width, const int* rows, const int* columns) {
-  for (int i = 0; i < m_; ++i) {
-    const double* c = wide + static_cast<std::ptrdiff_t>(rows[i]) * width;
-    double* a = large_->A.row(i).data();
-    for (int j = 0; j < n_; ++j) a[j] = c[columns[j]];
-  }
+void MinimumNorm::gather_large(const double* c, const int* columns, int k) {
+  double* a = large_->A.row(k).data();
+  for (int j = 0; j < n_; ++j) a[j] = c[columns[j]];
 }
 
-// Turns the rows of C into unit rows of C D. Returns false if an entry is not finite.
-bool MinimumNorm::scale_large() {
-  auto& A = large_->A;
-  const Eigen::Map<const Eigen::VectorXd> D(metric_.data(), n_);
-  for (int i = 0; i < m_; ++i) {
-    A.row(i) = A.row(i).cwiseProduct(D.transpose());
-    const double square = A.row(i).squaredNorm();
-    const double length = square > 1e-280 && square < 1e280
-                              ? std::sqrt(square)
-                              : small::careful_norm(A.row(i).data(), n_);
-    if (!std::isfinite(length)) return false;
-    row_norm_[static_cast<std::size_t>(i)] = length;
-    A.row(i) *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
-  }
+// Turns row k of A, which is row i of C, into the unit row of C D. Returns false if an entry is not
+// finite.
+bool MinimumNorm::scale_large(int k, int i) {
+  auto a = large_->A.row(k);
+  a = a.cwiseProduct(Eigen::Map<const Eigen::RowVectorXd>(metric_.data(), n_));
+  const double square = a.squaredNorm();
+  const double length =
+      square > 1e-280 && square < 1e280 ? std::sqrt(square) : small::careful_norm(a.data(), n_);
+  if (!std::isfinite(length)) return false;
+  row_norm_[static_cast<std::size_t>(i)] = length;
+  a *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
   return true;
 }
 
-// Returns the least independent part in the order that factor_kept() uses, or 0 if the rows are not
-// independent.
-double MinimumNorm::least_of_decided() {
-  const double least = independent_part(rank_ - 1);
-  if (kernel_ != nullptr || least < kLeastSine) return least;
-  KeptRows& kept = large_->kept;
-  if (!large_->split) kept.load(large_->A.data());
-  return kept.factor(large_->order.data(), rank_) ? kept.least_part(rank_) : 0.0;
-}
-
-bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns,
-                              const FilledPlaces* places) {
+bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
   if (kernel_ != nullptr) return factor_kept_small({wide, width, rows, columns, metric_.data()});
   const int r = rank_;
   if (r == 0) return false;
-  const bool split = large_->split;
-  if (!kept_ || split) decided_least_ = least_of_decided();
+  if (!kept_) decided_least_ = independent_part(r - 1);
   if (decided_least_ < kLeastSine) return false;
   kept_ = false;
-  if (split) large_->split = false;
-  KeptRows& kept = large_->kept;
-  if (!kept.load(wide, width, rows, columns, metric_.data(), row_norm_.data(), places))
-    return false;
-  if (!kept.factor(large_->order.data(), r)) return false;
-  const double least = kept.least_part(r);
+  for (int k = 0; k < m_; ++k) {
+    const int i = pivot(k);
+    gather_large(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, k);
+    if (!scale_large(k, i)) return false;
+  }
+  const double least = large_->factor(r);
   if (!(least >= std::max(kLeastSine, kLeastShare * decided_least_))) return false;
   kept_ = true;
-  large_->learn_units(row_norm_);
   rank_ = factored_rank_ = r;
   least_square_ = least * least;
   return true;
-}
-
-void MinimumNorm::Large::learn_units(const std::vector<double>& row_norm) {
-  for (std::size_t i = 0; i < row_norm.size(); ++i)
-    to_unit[i] = row_norm[i] > std::numeric_limits<double>::min() ? 1.0 / row_norm[i] : 1.0;
 }
 
 bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
   if (rank_ == 0 || rank_ < m_) return false;
   small::Storage& s = *small_;
   if (!kept_) {
-    decided_least_ = least_of_decided();
+    decided_least_ = independent_part(rank_ - 1);
     if (decided_least_ < kLeastSine) return false;
     for (int k = 0; k < m_; ++k) s.scale[k] = 1.0;
   }
@@ -220,10 +210,7 @@ void MinimumNorm::solve(const double* g, double* dy) {
   if (kernel_ != nullptr && kept_)
     small_kept_->solve(*small_kept_, small_->pivot, n_, g, metric_.data(), dy);
   else
-    kernel_ != nullptr ? solve_small(g, dy)
-    : kept_            ? solve_kept(g, dy)
-    : large_->split    ? solve_split(g, dy)
-                       : solve_orthogonal(g, dy);
+    kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_orthogonal(g, dy);
 }
 
 void MinimumNorm::solve_small(const double* g, double* dy) {
@@ -249,16 +236,15 @@ void MinimumNorm::solve_small(const double* g, double* dy) {
 // Computes du = A^T (A A^T)^-1 b over the rows that take part. The inconsistency of the others is
 // their entry of |b - A du|.
 void MinimumNorm::solve_kept(const double* g, double* dy) {
-  double* z = large_->rhs.data();
-  const int* order = large_->order.data();
-  const double* to_unit = large_->to_unit.data();
-  for (int k = 0; k < rank_; ++k) z[k] = g[order[k]] * to_unit[order[k]];
-  large_->kept.solve(rank_, z, dy);
-  for (int k = rank_; k < m_; ++k) {
-    const int i = order[k];
+  auto z = large_->rhs.head(rank_);
+  for (int k = 0; k < rank_; ++k) z[k] = scaled(g, pivot(k));
+  large_->solve(rank_, z);
+  Eigen::Map<Eigen::RowVectorXd> du(dy, n_);
+  du.setZero();
+  for (int k = 0; k < rank_; ++k) du += z[k] * large_->A.row(k);
+  for (int k = rank_; k < m_; ++k)
     inconsistency_[static_cast<std::size_t>(k)] =
-        std::abs(g[i] * to_unit[i] - large_->kept.times(i, dy));
-  }
+        std::abs(scaled(g, pivot(k)) - large_->A.row(k).dot(du));
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
@@ -310,9 +296,8 @@ std::vector<double> MinimumNorm::dependence(int k) const {
     const auto length = [&](int row) { return std::sqrt(s.square[s.pivot[row]]); };
     for (int j = 0; j < r; ++j) x[j] *= length(j) / length(k);
   } else if (kept_) {
-    large_->kept.dependence(pivot(k), r, x.data());
-  } else if (large_->split) {
-    return dependence_split(k);
+    x = large_->A.topRows(r) * large_->A.row(k).transpose();
+    large_->solve(r, x);
   } else {
     x = large_->qr.matrixQR().col(k).head(r);
     large_->qr.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
@@ -322,8 +307,7 @@ std::vector<double> MinimumNorm::dependence(int k) const {
 
 double MinimumNorm::independent_part(int k) const {
   if (kernel_ != nullptr) return std::sqrt(small_->ratio[k]);
-  if (kept_) return large_->kept.independent_part(k);
-  return large_->split ? independent_part_split(k) : std::abs(large_->qr.matrixQR()(k, k));
+  return kept_ ? large_->L(k, k) : std::abs(large_->qr.matrixQR()(k, k));
 }
 
 double MinimumNorm::condition() const {

@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <tether/export.hpp>
-#include <tether/linalg/filled.hpp>
 #include <vector>
 
 TETHER_EXPORT_BEGIN
@@ -27,11 +26,8 @@ struct Gathered;
 /// |R_kk| > rank_tolerance does not depend on the units of g. A A^T is not formed for it.
 ///
 /// Up to 16 x 32: Gram-Schmidt with reorthogonalisation in loops of fixed length; beyond that
-/// Eigen's ColPivHouseholderQR. Above 262144 entries A A^T = L L^T is formed after all, by the
-/// places that are filled: rows with L_kk above 1e-3 are independent, their squares known to 1e-10,
-/// and come first. What they leave of each other row is made orthogonal with pivoting. Where there
-/// are such rows and a quarter of A is filled, it is the QR again. resize() allocates, factor() and
-/// solve() do not.
+/// Eigen's ColPivHouseholderQR. Many rows of few entries are for SparseMinimumNorm. resize()
+/// allocates, factor() and solve() do not.
 class MinimumNorm {
  public:
   static constexpr int kSmallRows = 16;     ///< most rows of the loops of fixed length
@@ -60,18 +56,15 @@ class MinimumNorm {
   double* metric() { return metric_.data(); }
 
   /// The same for C(i, j) = wide[rows[i] * width + columns[j]], with D from metric(): nothing is
-  /// copied twice. rows has m entries, columns n, ascending. `places`: those that `wide` has ever
-  /// filled, in a list that lives as long as this; null: not known.
+  /// copied twice. rows has m entries, columns n, ascending.
   bool factor(const double* wide, int width, const int* rows, const int* columns,
-              double rank_tolerance, const FilledPlaces* places = nullptr);
+              double rank_tolerance);
 
-  /// The same with the rows that the last factor() and use_rank() let take part, in their order,
-  /// from A A^T of these alone. It takes some tenth of the work, less where rows have few entries,
-  /// and up to 16 x 32 half of it, without the chain of one pivot after the other. False: an entry
+  /// The same with the rows that the last factor() and use_rank() let take part, in their order.
+  /// A A^T = L L^T of these alone takes a fourth to a half of the work. False: an entry
   /// is not finite, a row depends on those before it but for a sine below 1e-3 or a third of what
   /// factor() found least. Also where a small system has dropped rows. Then factor() is due.
-  bool factor_kept(const double* wide, int width, const int* rows, const int* columns,
-                   const FilledPlaces* places = nullptr);
+  bool factor_kept(const double* wide, int width, const int* rows, const int* columns);
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
   /// Dropped rows take no part; see inconsistency().
@@ -79,17 +72,14 @@ class MinimumNorm {
 
   /// Until the next factor() only the first `rank` rows of the pivot order take part, at most as
   /// many as factor() has kept.
-  void use_rank(int rank) {
-    rank_ = rank < factored_rank_ ? rank : factored_rank_;
-    if (kernel_ == nullptr) limit_rank();
-  }
+  void use_rank(int rank) { rank_ = rank < factored_rank_ ? rank : factored_rank_; }
 
   int rank() const { return rank_; }          ///< rows that take part in solve()
   int dropped() const { return m_ - rank_; }  ///< rows that do not
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const;
   /// |R_kk|, k < rank(): how much of a unit row is independent of those before it. From factor() no
-  /// larger than the one before, but for those of at least 1e-3 where A A^T has found them.
+  /// larger than the one before.
   double independent_part(int k) const;
   /// The square of the smallest one that factor() has kept; 1 for rank 0.
   double least_square() const { return least_square_; }
@@ -106,16 +96,9 @@ class MinimumNorm {
 
  private:
   void set_rank(int rank);
-  void gather_large(const double* wide, int width, const int* rows, const int* columns);
-  bool scale_large();
-  bool splits() const;
-  bool factor_split(double rank_tolerance);
-  void limit_rank();
-  void solve_split(const double* g, double* dy);
-  std::vector<double> dependence_split(int k) const;
-  double independent_part_split(int k) const;
+  void gather_large(const double* c, const int* columns, int k);
+  bool scale_large(int k, int i);
   bool factor_orthogonal(double rank_tolerance);
-  double least_of_decided();
   bool factor_kept_small(const small::Gathered& from);
   void solve_kept(const double* g, double* dy);
   void solve_orthogonal(const double* g, double* dy);
