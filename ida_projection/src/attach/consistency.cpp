@@ -253,11 +253,7 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
   current_weights(yy);
   OwnedVector y(yy);
   N_VScale(1.0, yy, y);
-  // An interpolated point is near IDA's step, whose factors are at hand. y' asks for those of C
-  // here.
-  const bool followed = yp == nullptr && movers_.used == movers_.own.get() &&
-                        point_.follow(t, y, unknowns_.weights, *movers_.used, report);
-  if (!followed) point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
+  point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
   if (report.status == Status::success && yp != nullptr) {
     OwnedVector ydot(yp);
     N_VScale(1.0, yp, ydot);

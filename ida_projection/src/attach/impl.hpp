@@ -54,9 +54,6 @@ class Projection::Impl {
   // consistency.cpp
   ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp, const Consistency& how);
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
-  void rows_changed() {
-    if (movers_.used != nullptr) movers_.used->rows().rows_changed();
-  }
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
 
   // sensitivity/attach.cpp: a program that asks for none links none of it

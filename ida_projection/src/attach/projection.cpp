@@ -207,7 +207,6 @@ ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector y
   return impl_->answer("make_consistent", {yy, yp},
                        [&] { return impl_->make_consistent(t0, yy, yp, how); });
 }
-void Projection::rows_changed() { impl_->rows_changed(); }
 
 ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
   return impl_->answer("project", {yy, yp}, [&] { return impl_->project(t, yy, yp); });

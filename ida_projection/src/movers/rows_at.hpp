@@ -104,16 +104,6 @@ class RowsAt {
   virtual bool use_levels(bool) { return false; }
   virtual bool may_use_levels() const { return false; }
 
-  /// Rank of the factors for solve_with_factors(); -1: there are none.
-  virtual int rank_of_factors() const { return -1; }
-  /// The caller's rows are others than those of the current factors.
-  virtual void rows_changed() {}
-  /// dy (N entries) for other values g, near a hundredth. False: not known.
-  virtual bool solve_with_factors(const std::vector<double>& /*g*/, std::vector<double>& /*dy*/) {
-    return false;
-  }
-  /// After that: what rows that the factors leave out ask for beyond the others, in tolerances.
-  virtual double left_of_dropped(const std::vector<double>& /*WT*/) { return 0.0; }
   /// C y' row by row with C as it was evaluated last. False: not known.
   virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
     return false;

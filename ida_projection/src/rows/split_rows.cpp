@@ -255,27 +255,27 @@ bool SplitRows<Solver>::factor_kept() {
 }
 
 template <class Solver>
-void SplitRows<Solver>::solve_block(Block& block, double solved) {
+void SplitRows<Solver>::solve_block(Block& block) {
   if constexpr (kDense)
     block.solver.solve(block.g.data(), block.dy.data());
   else
     block.solver.solve(
         block.g.data(), block.dy.data(),
-        std::max(solved * block.least_independent, linalg::SparseMinimumNorm::kTolerance));
+        std::max(kSolved * block.least_independent, linalg::SparseMinimumNorm::kTolerance));
 }
 
 template <class Solver>
-void SplitRows<Solver>::solve_to(const std::vector<double>& g, double solved) {
+void SplitRows<Solver>::solve(const std::vector<double>& g) {
   if constexpr (kDense) {
     if (a.rows.empty()) return d.solver.solve(g.data(), d.dy.data());  // d has every row, in order
   }
   for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
-  solve_block(d, solved);
+  solve_block(d);
   if (a.rows.empty()) return;
   d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
   for (std::size_t k = 0; k < a.rows.size(); ++k)
     a.g[k] = g[at(a.rows[k])] - times(a.rows[k], moved_.data());
-  solve_block(a, solved);
+  solve_block(a);
 }
 
 template <class Solver>

@@ -85,10 +85,7 @@ class SplitRows {
   /// The same with the rows that the last factor() has kept. False: factor() is due.
   bool factor_kept();
   /// d.dy and a.dy for the values g, with the C that was factored.
-  void solve(const std::vector<double>& g) { solve_to(g, kSolved); }
-  /// The same for sparse rows by one step with the regularised factors, where the next solve takes
-  /// the rest.
-  void solve_roughly(const std::vector<double>& g) { solve_to(g, 1.0); }
+  void solve(const std::vector<double>& g);
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   /// The rows whose move is measured in tolerances.
   Block& counted() { return d.rows.empty() ? a : d; }
@@ -127,8 +124,7 @@ class SplitRows {
   void watch();
   void set_up(Block& block, std::vector<int>* gather);
   bool factor(Block& block, const std::vector<int>& gather);
-  void solve_block(Block& block, double solved);
-  void solve_to(const std::vector<double>& g, double solved);
+  void solve_block(Block& block);
   LeftOfDropped most_left(const Block& block, const std::vector<double>& WT) const;
 
   const Constraints& constraints_;

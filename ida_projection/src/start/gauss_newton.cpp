@@ -16,11 +16,8 @@ namespace {
 constexpr int kMaximumIterations = 60;
 constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
-// Most steps of follow() by factors of another point.
-constexpr int kSimplifiedSteps = 14;
-constexpr double kNear = 1.0, kShrinks = 0.25;
-constexpr double kFollowed = 1e-12;  // tolerances: no last step makes more of it, as above
-constexpr double kAside = 10.0;      // what dropped rows may ask for, beside the others
+constexpr double kNear = 1.0;
+constexpr double kAside = 10.0;  // what dropped rows may ask for, beside the others
 
 // `Rows` keeps C and its factors: DenseRows (dense) or SparseRows.
 template <class Rows>
@@ -34,8 +31,6 @@ class GaussNewtonOn final : public GaussNewton {
 
   void project(double t, std::vector<double>& y, const std::vector<double>& WT,
                const std::vector<bool>& hold, const double* id, ConsistencyReport& report) override;
-  bool follow(double t, std::vector<double>& y, const std::vector<double>& WT, Mover& near,
-              ConsistencyReport& report) override;
   bool tangent(double t, const std::vector<double>& y, double* yp) override;
   bool fatal() const override { return evaluator_.fatal(); }
   const std::string& message() const override { return evaluator_.message(); }
@@ -239,40 +234,6 @@ void GaussNewtonOn<Rows>::project(double t, std::vector<double>& y0, const std::
         "says little about it; write the rows without squares";
   }
   if (report.status == Status::success) y0 = y;
-}
-
-// The rate at which steps shrink tells how much the last one leaves.
-template <class Rows>
-bool GaussNewtonOn<Rows>::follow(double t, std::vector<double>& y0, const std::vector<double>& WT,
-                                 Mover& near, ConsistencyReport& report) {
-  WT_ = WT;
-  evaluator_.forget();
-  std::vector<double> y = y0, dy(y.size());
-  const double floor = floor_of(y), enough = std::max(kFollowed, floor);
-  double previous = kNear / kShrinks;
-  if (!evaluate(t, y, report)) return false;
-  report.drift_before = largest(g_);
-  report.rank = near.rows().rank_of_factors();
-  for (report.iterations = 0; report.iterations < kSimplifiedSteps;) {
-    if (!near.rows().solve_with_factors(g_, dy)) return false;
-    double sum = 0.0;
-    for (std::size_t i = 0; i < y.size(); ++i) sum += dy[i] / WT_[i] * (dy[i] / WT_[i]);
-    const double length = std::sqrt(sum / n_), rate = length / previous;
-    if (!(length <= enough || rate <= kShrinks)) return false;
-    for (std::size_t i = 0; i < y.size(); ++i) y[i] -= dy[i];
-    if (!evaluate(t, y, report)) return false;
-    if (length <= enough || (++report.iterations > 1 && rate * length <= enough)) {
-      report.drift_after = largest(g_);
-      if (near.rows().left_of_dropped(WT_) > 0.0 &&
-          (!near.rows().solve_with_factors(g_, dy) ||
-           near.rows().left_of_dropped(WT_) > kAside * std::max(kConverged, floor)))
-        return false;
-      y0 = y;
-      return true;
-    }
-    previous = length;
-  }
-  return false;
 }
 
 template <class Rows>

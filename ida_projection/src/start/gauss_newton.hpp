@@ -24,12 +24,6 @@ class GaussNewton {
                        const std::vector<bool>& hold, const double* id,
                        ConsistencyReport& report) = 0;
 
-  /// The same for a point less than a tolerance away, by simplified Newton steps with the factors
-  /// of `near`: none costs more than g and a solve. False, and y as it was: there are no factors, g
-  /// fails, steps do not shrink to a quarter of the one before, or dropped rows ask for more.
-  virtual bool follow(double t, std::vector<double>& y, const std::vector<double>& WT, Mover& near,
-                      ConsistencyReport& report) = 0;
-
   /// After project(): y' onto C y' + g_t = 0 (nearest in the weights), with g_t by central
   /// differences. False if g fails nearby.
   virtual bool tangent(double t, const std::vector<double>& y, double* yp) = 0;

@@ -58,18 +58,6 @@ GaussNewton& PointProjection::nearest(N_Vector y) {
   return *nearest_;
 }
 
-bool PointProjection::follow(double t, N_Vector y, N_Vector weights, Mover& near,
-                             ConsistencyReport& report) {
-  if (!has_values(constraints_) || near.rows().rank_of_factors() < 0) return false;
-  double* values = N_VGetArrayPointer(y);
-  std::vector<double> point(values, values + N_VGetLength(y));
-  ConsistencyReport found;
-  if (!nearest(y).follow(t, point, tolerances(y, weights), near, found)) return refused(report);
-  report = found;
-  std::copy(point.begin(), point.end(), values);
-  return true;
-}
-
 void PointProjection::project_values(double t, N_Vector y, const std::vector<bool>& hold,
                                      N_Vector id, N_Vector weights, ConsistencyReport& report) {
   double* values = N_VGetArrayPointer(y);

@@ -21,9 +21,6 @@ class PointProjection {
   /// that stay, beside those of the options. y changes only on success.
   void project(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id, N_Vector weights,
                ConsistencyReport& report);
-  /// The same for a point that the factors of `near` may bring there (GaussNewton::follow). False:
-  /// that is not known, and y is as it was.
-  bool follow(double t, N_Vector y, N_Vector weights, Mover& near, ConsistencyReport& report);
   /// The part of yp along the constraints at y; `report` changes where a callback ends the run.
   /// False: not found, or not looked for.
   bool tangent(double t, N_Vector y, N_Vector yp, ConsistencyReport& report);

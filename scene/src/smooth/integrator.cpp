@@ -85,7 +85,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
                                      : ida_projection::Polished::differential;
     projection.suppress_algebraic = false;  // IDASetSuppressAlg above stands
     projection.progress = [this](const ida_projection::Progress&) {
-      if (system_.choose_rows_after_step()) session_->projection()->rows_changed();
+      system_.choose_rows_after_step();
     };
     session_->project(system.constraints(), projection);
   }

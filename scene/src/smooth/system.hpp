@@ -76,7 +76,7 @@ class System {
   /// Chooses the rows of the joints that are used from here on, see rows_in_use.cpp.
   void choose_rows(double t, const double* y, double tolerance);
   /// After a step. True: constraints() give other rows from here on.
-  bool choose_rows_after_step() { return in_use_.choose_after_step(); }
+  void choose_rows_after_step() { in_use_.choose_after_step(); }
   double weakest_pivot() const { return in_use_.weakest_pivot(); }
   /// At a state near a singular position: joints whose rows depend on each other there. Empty
   /// elsewhere.

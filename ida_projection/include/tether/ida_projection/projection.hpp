@@ -114,14 +114,8 @@ class [[nodiscard]] Projection {
                                     const Consistency& how = {});
 
   /// A point between steps (interpolated output, a root, a restart) onto the constraints; yp (may
-  /// be null) onto their tangent C y' + g_t = 0. On failure both are unchanged. Where yp is null
-  /// and the point is near, the factors of the last step bring it there in their metric, by values
-  /// of g alone; steps are the same with and without.
+  /// be null) onto their tangent C y' + g_t = 0. On failure both are unchanged.
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp = nullptr);
-
-  /// The host's Constraints give other rows from here on: project() then does without factors
-  /// of those before, which serve points between steps where yp is null.
-  void rows_changed();
 
   /// IDASolve, then project() of what it returns. Returns IDASolve's flag; a failed projection of
   /// the returned point leaves that point as IDA gave it and shows in status().

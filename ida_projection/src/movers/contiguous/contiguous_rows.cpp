@@ -142,7 +142,6 @@ Status ContiguousRows<Rows>::factor(double t, bool refill) {
     return Status::not_finite;
   }
   uses_.there = true;
-  uses_.foreign = false;
   return Status::success;
 }
 
@@ -150,7 +149,6 @@ Status ContiguousRows<Rows>::factor(double t, bool refill) {
 template <class Rows>
 bool ContiguousRows<Rows>::decide() {
   ++statistics_.factorizations;
-  uses_.partial = false;
   if (count() > kFewForLevels) find_rates();
   if (!blocks_.factor()) return false;
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
@@ -235,7 +233,6 @@ double ContiguousRows<Rows>::judge_thin_rows(double length) {
     const int trusted = blocks_.trust.trusted_rows(solver, firm_length);
     solver.use_rank(trusted);
     uses_.lasting = RowTrust::lasting(solver, firm, trusted);
-    uses_.partial = trusted < all;
     if (whole && trusted < all) ++statistics_.rank_drops;
     return trusted > firm ? by(trusted) : firm_length;
   }
@@ -380,20 +377,6 @@ double ContiguousRows<Rows>::rounding_length() {
   g_ = g;
   blocks_.solve(g_);
   return total;
-}
-
-template <class Rows>
-bool ContiguousRows<Rows>::solve_with_factors(const std::vector<double>& g,
-                                              std::vector<double>& dy) {
-  if (g.size() != g_.size()) return false;
-  blocks_.solve_roughly(g);
-  std::fill(dy.begin(), dy.end(), 0.0);
-  for (const Block* block : {&blocks_.d, &blocks_.a})
-    if (!block->rows.empty())
-      block->for_columns([&dy, from = block->dy.data()](int k, int i) {
-        dy[static_cast<std::size_t>(i)] = from[k];
-      });
-  return true;
 }
 
 template <class Rows>

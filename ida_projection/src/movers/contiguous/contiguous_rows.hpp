@@ -84,15 +84,6 @@ class ContiguousRows final : public RowsAt {
     return count() > kFewForLevels && !uses_.thin && !blocks_.dropped_rows();
   }
 
-  int rank_of_factors() const override {
-    const bool serve = uses_.there && !uses_.thin && !uses_.partial && !uses_.foreign;
-    return serve ? blocks_.rank() : -1;
-  }
-  void rows_changed() override { uses_.foreign = true; }
-  bool solve_with_factors(const std::vector<double>& g, std::vector<double>& dy) override;
-  double left_of_dropped(const std::vector<double>& WT) override {
-    return blocks_.dropped_rows() ? blocks_.left_of_dropped(WT) : 0.0;
-  }
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
   bool fatal() const override { return evaluator_.fatal(); }
   void forget_failure() override { evaluator_.forget(); }
@@ -105,8 +96,6 @@ class ContiguousRows final : public RowsAt {
     bool thin = false;     ///< the last factor() found rows that need RowTrust
     bool lasting = false;  ///< which rows it has kept is right for the next steps, too
     bool decided = false;  ///< it found that out for this candidate
-    bool partial = false;  ///< independent rows are left out, too thin to be trusted
-    bool foreign = false;  ///< the caller's rows are others now
   };
 
   int count() const { return static_cast<int>(g_.size()); }

@@ -35,7 +35,7 @@ class RowsInUse {
   /// Chooses at the state that is set, for this local tolerance from now on.
   void choose(double tolerance);
   /// After a step, at the state that is set. True: used() has other rows than before.
-  bool choose_after_step();
+  void choose_after_step();
   void choose_now() { choose(); }
 
  private:
