@@ -1,5 +1,5 @@
 #!/bin/sh
-# The core of the projection knows none of its add-ons, and a program links none that it does not use.
+# The core of the projection knows none of its add-ons, its rooms stand on each other in one order, and a program links none that it does not use.
 # SPDX-License-Identifier: BSD-3-Clause
 #
 #   layout.sh SOURCES PROGRAM      PROGRAM projects by one added call, linked to a static library
@@ -10,6 +10,10 @@ for folder in attach constraints host movers rows start step watch; do
     exit 1
   fi
 done
+# No room uses one that uses it.
+for folder in attach constraints host movers rows start step watch; do
+  grep -rhoE '^#include "[a-z_]+/' "$1/$folder" | sed 's/.*"//; s#/$##' | sort -u | grep -vx "$folder" | sed "s/^/$folder /"
+done | tsort >/dev/null
 # Which symbols are there shows that names are seen at all.
 names=$(nm -C "$2" | grep -o 'tether::ida_projection::[A-Z][A-Za-z]*' | sort -u)
 echo "$names" | grep -q 'Mover$'

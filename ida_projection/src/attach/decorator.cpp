@@ -10,8 +10,8 @@
 #include <limits>
 
 #include "attach/impl.hpp"
-#include "attach/shortest.hpp"
 #include "host/mechanisms.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

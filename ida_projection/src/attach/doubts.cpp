@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "attach/impl.hpp"
-#include "attach/shortest.hpp"
 #include "host/mechanisms.hpp"
+#include "host/shortest.hpp"
 #include "watch/dead_point.hpp"
 
 namespace tether::ida_projection {

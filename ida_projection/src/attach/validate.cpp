@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "attach/impl.hpp"
-#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

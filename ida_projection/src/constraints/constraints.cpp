@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <tether/ida_projection/constraints.hpp>
 
-#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

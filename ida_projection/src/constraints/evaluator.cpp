@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "attach/shortest.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

@@ -11,30 +11,9 @@
 #include <tether/ida_projection/statistics.hpp>
 #include <vector>
 
+#include "host/guarded.hpp"
+
 namespace tether::ida_projection {
-
-/// what() may be null.
-inline const char* text_of(const std::exception& e) noexcept {
-  const char* text = e.what();
-  return text != nullptr ? text : "an exception whose what() is null";
-}
-
-/// Runs a user callback: no exception leaves it. Returns the callback's int; `message` receives
-/// the text of an exception, which counts as fatal.
-template <class Call>
-int guarded(Call&& call, std::string& message) noexcept {
-  try {
-    return call();
-  } catch (const std::exception& e) {
-    try {
-      message = text_of(e);
-    } catch (...) {
-    }
-    return -1;
-  } catch (...) {
-    return -1;
-  }
-}
 
 /// Do the rows on n unknowns get sparse factors? Those of a set with a SparseJacobian in it that is
 /// large. A small one gets the factors of dense rows, however it is given: the same rows then make

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <tether/linalg/index.hpp>
 
+#include "host/rounding.hpp"
 #include "movers/vector/vector_rows.hpp"
-#include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
 

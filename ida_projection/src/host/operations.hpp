@@ -9,9 +9,8 @@
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
 
-#include "constraints/evaluator.hpp"
 #include "host/corrector.hpp"
-#include "watch/report.hpp"
+#include "host/guarded.hpp"
 
 namespace tether::ida_projection {
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "attach/shortest.hpp"
 #include "host/mechanisms.hpp"
-#include "rows/rounding.hpp"
+#include "host/rounding.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

@@ -14,7 +14,7 @@
 #include <sunmatrix/sunmatrix_dense.h>
 #include <tether/reverse_ida.hpp>
 
-#include "attach/shortest.hpp"
+#include "host/shortest.hpp"
 #include "reverse/fiber.hpp"
 
 namespace tether::reverse_ida {

@@ -8,8 +8,8 @@
 #include <tether/ida_projection/constraints.hpp>
 #include <vector>
 
-#include "attach/shortest.hpp"
-#include "rows/rounding.hpp"
+#include "host/rounding.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

@@ -1,6 +1,6 @@
 // Tether: few rows given by their gradients, on any N_Vector. SPDX-License-Identifier: BSD-3-Clause
 #include "rows/gradient_rows.hpp"
-#include "rows/rounding.hpp"
+#include "host/rounding.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <utility>
 
-#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
+#include "host/shortest.hpp"
 #include "rows/split_rows.hpp"
 #include "sensitivity/tangent_rows.hpp"
 

@@ -7,9 +7,9 @@
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <utility>
 
-#include "attach/shortest.hpp"
 #include "host/operations.hpp"
-#include "rows/rounding.hpp"
+#include "host/rounding.hpp"
+#include "host/shortest.hpp"
 #include "sensitivity/wrapped.hpp"
 
 namespace tether::ida_projection {

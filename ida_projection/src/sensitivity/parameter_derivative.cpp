@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "attach/shortest.hpp"
 #include "constraints/evaluator.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

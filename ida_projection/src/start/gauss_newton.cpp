@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "attach/shortest.hpp"
-#include "rows/rounding.hpp"
+#include "host/rounding.hpp"
+#include "host/shortest.hpp"
 #include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {

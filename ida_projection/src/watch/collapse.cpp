@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "attach/shortest.hpp"
+#include "host/shortest.hpp"
 #include "watch/first_steps.hpp"
 #include "watch/kink.hpp"
 

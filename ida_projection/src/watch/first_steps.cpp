@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "attach/shortest.hpp"
+#include "host/shortest.hpp"
 #include "watch/kink.hpp"
 
 namespace tether::ida_projection {

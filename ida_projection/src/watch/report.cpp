@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "attach/shortest.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

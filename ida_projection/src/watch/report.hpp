@@ -3,15 +3,13 @@
 #pragma once
 
 #include <string>
-#include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/projection.hpp>
 #include <tether/ida_projection/statistics.hpp>
 
-namespace tether::ida_projection {
+#include "host/guarded.hpp"
 
-constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
-constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
+namespace tether::ida_projection {
 
 /// Outcomes of solves, counted in the statistics; what Projection::status() and message() tell.
 class Report {

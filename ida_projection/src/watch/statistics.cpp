@@ -5,7 +5,7 @@
 #include <tether/ida_projection/statistics.hpp>
 #include <vector>
 
-#include "attach/shortest.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "attach/shortest.hpp"
 #include "host/mechanisms.hpp"
+#include "host/shortest.hpp"
 #include "rows/row_levels.hpp"
 
 namespace tether::ida_projection {

@@ -9,10 +9,10 @@
 
 #include "constraints/evaluator.hpp"
 #include "host/mechanisms.hpp"
+#include "host/rounding.hpp"
 #include "movers/loaded_candidate.hpp"
 #include "movers/local_metric.hpp"
 #include "movers/mover.hpp"
-#include "rows/rounding.hpp"
 #include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {

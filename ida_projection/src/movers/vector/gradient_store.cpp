@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/rounding.hpp"
 #include "movers/vector/vector_rows.hpp"
-#include "rows/rounding.hpp"
 
 namespace tether::ida_projection {
 
