@@ -6,13 +6,13 @@
 
 namespace tether::test {
 
-/// Message of the std::invalid_argument that `call` throws; empty if it throws nothing. (Catch2 v2
-/// and v3 name their string matchers differently.)
-template <class Call>
+/// Message of the exception that `call` throws; empty if it throws nothing. (Catch2 v2 and v3 name
+/// their string matchers differently.)
+template <class Exception = std::invalid_argument, class Call>
 std::string thrown(Call&& call) {
   try {
     call();
-  } catch (const std::invalid_argument& e) {
+  } catch (const Exception& e) {
     return e.what();
   }
   return {};

@@ -3,6 +3,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -91,16 +92,13 @@ constexpr EngineKind kCableEngines[] = {EngineKind::smooth, EngineKind::event};
 double first_contact() { return std::sqrt(2 * 1.5 / kFall); }
 
 std::string cable_refusal(const std::string& bodies, const std::string& rest) {
-  try {
+  return tether::test::thrown<SceneError>([&] {
     cable_scene(
         hanging("a", 1, 0, 0) + hanging("b", 1, 1, 0) +
         "[[spring]]\nname = \"coil\"\nbodies = [\"a\", \"b\"]\nat = [[0, 0, 0], [1, 0, 0]]\n"
         "stiffness = 1\n[[cable]]\nname = \"rope\"\nbodies = " +
         bodies + "\n" + rest);
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "";
+  });
 }
 
 }  // namespace cables
@@ -294,11 +292,7 @@ TEST_CASE("cables are written, read again, planned, and refused by name") {
   refused("[\"a\", \"b\"]", points + stiff + "rest = 1\n", "rest");
   refused("[\"a\", \"b\"]", points + stiff + "winch = -0.6\n", "winch");
   refused("[\"a\", \"b\"]", points + stiff + "winch = nan\n", "winch");
-  std::string message;
-  try {
-    cable_engine(bungee(0), EngineKind::stepping, 1);
-  } catch (const std::invalid_argument& e) {
-    message = e.what();
-  }
+  const std::string message =
+      tether::test::thrown([] { cable_engine(bungee(0), EngineKind::stepping, 1); });
   CHECK(message.find("cable \"cord\": a step of 1 s is too long") != std::string::npos);
 }

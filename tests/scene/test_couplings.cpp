@@ -3,6 +3,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -196,12 +197,9 @@ TEST_CASE("couplings are written, read again and refused by name") {
       "[[body]]\nname = \"x\"\nmass = 1\ninertia = [1, 1, 1]\n[[joint]]\nname = \"held\"\nkind = "
       "\"ball\"\nbodies = [\"x\", \"world\"]\nat = [0, 0, 0]\n";
   for (const auto& each : wrong) {
-    std::string said;
-    try {
+    const std::string said = tether::test::thrown<SceneError>([&] {
       scene_of("smooth", 1e-6, 1, kPlanetary + held + coupling(each.joints, each.values));
-    } catch (const std::exception& e) {
-      said = e.what();
-    }
+    });
     INFO(each.joints << " " << each.values << " " << said);
     CHECK(said.find(each.words) != std::string::npos);
     const std::size_t named = said.find("coupling \"");

@@ -7,6 +7,7 @@
 #include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 
+#include "linalg/thrown.hpp"
 #include "mechanisms.hpp"
 #include "run_files.hpp"
 #include "support/catch.hpp"
@@ -281,12 +282,10 @@ TEST_CASE("expectations of forces are read, written, judged and refused by name"
   CHECK(again.expect[0].against == 0);
   CHECK(write_scene(again) == write_scene(s));
   const auto refused = [&](const std::string& more, const std::string& says) {
-    try {
-      parse_scene(std::string(kSlope) + more, "slope.toml");
-      FAIL("read: " << more);
-    } catch (const SceneError& e) {
-      CHECK(std::string(e.what()).find(says) != std::string::npos);
-    }
+    INFO(more);
+    CHECK(tether::test::thrown<SceneError>([&] {
+            parse_scene(std::string(kSlope) + more, "slope.toml");
+          }).find(says) != std::string::npos);
   };
   refused("\n[[expect]]\nquantity = \"joint_force\"\njoint = \"pin\"\nat_most = 1\n",
           "no such joint");

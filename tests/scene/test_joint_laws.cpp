@@ -5,6 +5,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "jointed_scenes.hpp"
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace mechanisms;
@@ -55,12 +56,7 @@ std::vector<double> bounces(const Scene& s, double end) {
 }
 
 std::string refusal(const Scene& s) {
-  try {
-    make_engine(s);
-  } catch (const std::invalid_argument& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown([&] { make_engine(s); });
 }
 
 }  // namespace
@@ -440,13 +436,10 @@ friction = 0.25
   const auto reads = [&](const std::string& from, const std::string& to, const std::string& says) {
     std::string changed = text;
     changed.replace(changed.find(from), from.size(), to);
-    try {
-      parse_scene(changed, "laws.toml");
-      FAIL("read: " << to);
-    } catch (const SceneError& e) {
-      INFO(e.what());
-      CHECK(std::string(e.what()).find(says) != std::string::npos);
-    }
+    const std::string said =
+        tether::test::thrown<SceneError>([&] { parse_scene(changed, "laws.toml"); });
+    INFO(to << ": " << said);
+    CHECK(said.find(says) != std::string::npos);
   };
   reads("[-90, 45]", "[10, 45]", "between them");
   reads("[-90, 45]", "[-200, 170]", "full turn");

@@ -3,6 +3,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -121,13 +122,7 @@ bodies = ["a", "b"]
 }
 
 std::string why_not(const std::string& text) {
-  try {
-    const Scene scene = scene_of(text);
-    make_engine(scene);
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown<std::exception>([&] { make_engine(scene_of(text)); });
 }
 
 bool contains(const std::string& text, const char* part) {

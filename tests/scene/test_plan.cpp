@@ -5,6 +5,7 @@
 #include <tether/scene/plan.hpp>
 #include <vector>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 #include "texts.hpp"
 
@@ -26,12 +27,7 @@ Names effects(const std::string& text) {
 
 std::string refusal(const std::string& text) {
   const Scene scene = parse_scene(text, "plan.toml");
-  try {
-    make_plan(scene);
-  } catch (const std::invalid_argument& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown([&] { make_plan(scene); });
 }
 
 const std::string kSphere =

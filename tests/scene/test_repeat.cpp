@@ -4,6 +4,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/vary.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -23,12 +24,7 @@ std::string ball(const std::string& name, const std::string& position,
 }
 
 std::string error(const std::string& text) {
-  try {
-    parse_scene(text, "repeat.toml");
-  } catch (const SceneError& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown<SceneError>([&] { parse_scene(text, "repeat.toml"); });
 }
 
 }  // namespace

@@ -256,12 +256,8 @@ TEST_CASE("smooth: a run that ends at a dead point names the joints that depend 
   hold("left", 0, {0, 0, 0}, {-1, 0, 0});
   hold("beside", 1, {0, 3, 0}, {0, 4, 0});
   hold("right", 0, {0, 0, 0}, {1, 0, 0});
-  std::string text;
-  try {
-    make_smooth_engine(taut)->advance(0.5);
-  } catch (const SimulationError& error) {
-    text = error.what();
-  }
+  const std::string text =
+      tether::test::thrown<SimulationError>([&] { make_smooth_engine(taut)->advance(0.5); });
   INFO(text);
   CHECK(contains(text, "dead point"));
   CHECK(contains(text, "\"left\""));

@@ -3,6 +3,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -105,12 +106,7 @@ TEST_CASE("surface speeds are written, read again and refused by name") {
   REQUIRE(again.bodies[0].surface);
   CHECK(again.bodies[0].surface->velocity == Vector3d(1.5, 0, 0));
   const auto said = [](const std::string& surface) {
-    try {
-      on_plane(surface, kBox, 0.3);
-    } catch (const std::exception& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return tether::test::thrown<SceneError>([&] { on_plane(surface, kBox, 0.3); });
   };
   CHECK(said("").find("give velocity") != std::string::npos);
   CHECK(said("velocity = [1, 2]").find("velocity") != std::string::npos);

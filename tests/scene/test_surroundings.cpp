@@ -5,6 +5,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -35,12 +36,7 @@ double energy_in(const Engine& engine) {
 }
 
 std::string refused_for(const std::string& text) {
-  try {
-    surrounded(text);
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown<SceneError>([&] { surrounded(text); });
 }
 
 bool holds_text(const std::string& text, const char* part) {

@@ -3,6 +3,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -72,15 +73,12 @@ std::unique_ptr<Engine> table_engine(Scene scene, EngineKind engine, double accu
 }
 
 std::string table_refusal(const std::string& spring, const std::string& joint) {
-  try {
+  return tether::test::thrown<SceneError>([&] {
     tabled(
         "[[body]]\nname = \"a\"\nmass = 1\ninertia = [1, 1, 1]\n[[joint]]\nbodies = [\"a\", "
         "\"world\"]\n" +
         joint + "spring = { " + spring + " }\n");
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "";
+  });
 }
 
 }  // namespace tabulated

@@ -6,6 +6,7 @@
 #include <tether/scene/run.hpp>
 
 #include "import/import.hpp"
+#include "linalg/thrown.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
@@ -31,12 +32,7 @@ bool said(const std::string& text, const std::string& words) {
 }
 
 std::string mjcf_refusal(const std::string& text) {
-  try {
-    import_robot(text, "robot.xml", {});
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown<std::exception>([&] { import_robot(text, "robot.xml", {}); });
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <tether/scene/run.hpp>
 
 #include "import/import.hpp"
+#include "linalg/thrown.hpp"
 #include "robots.hpp"
 #include "support/catch.hpp"
 
@@ -101,12 +102,7 @@ double error(const Robot& robot, bool free_base) {
 }
 
 std::string urdf_refusal(const std::string& text, const ImportOptions& options = {}) {
-  try {
-    import_robot(text, "robot.urdf", options);
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "";
+  return tether::test::thrown<std::exception>([&] { import_robot(text, "robot.urdf", options); });
 }
 
 /// A link with mass, and a second one on a joint with this type and these parts.
