@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tether/scene/cost.hpp>
 #include <tether/scene/files.hpp>
-#include <tether/scene/player.hpp>
 #include <tether/scene/run.hpp>
 
 #include "player/film.hpp"
@@ -44,13 +44,9 @@ between = ["m", "m"]
 friction = 0.2
 )";
 
-RunResult play(const Scene& scene, const std::string& file) {
-  Player player(scene, file);
-  RunOptions options;
-  options.record = [&](const Engine& engine) { player.record(engine); };
-  const RunResult result = run(scene, options);
-  player.write();
-  return result;
+RunResult play(Scene scene, const std::string& file) {
+  scene.output["html"] = file;
+  return run(scene);
 }
 
 std::string page_of(const Scene& scene) {
@@ -316,8 +312,6 @@ TEST_CASE(
   CHECK_THROWS_AS(play(scene, page), std::invalid_argument);
   scene.file.clear();
   CHECK_THROWS_AS(play(scene, path.string() + "/"), std::invalid_argument);
-  const Player first(scene, page);
-  CHECK_THROWS_WITH(play(scene, page), Catch::Contains("lock") || Catch::Contains("another run"));
 }
 
 TEST_CASE("a page of costs has every point of the table and the command that repeats it") {
@@ -334,19 +328,20 @@ TEST_CASE("a page of costs has every point of the table and the command that rep
   CHECK(page.find("<img") == std::string::npos);
   CHECK(page.find("<b>") == std::string::npos);
   CHECK(page.find("http:") == page.find("http://www.w3.org/2000/svg"));  // a name, not a link
-  const std::string begin = "<script id=\"cost-data\" type=\"application/json\">";
-  const std::size_t at = page.find(begin) + begin.size();
-  const Json data = Json::parse(page.substr(at, page.find("</script>", at) - at));
-  CHECK(data["wanted"] == 1e-2);
-  CHECK(data["methods"] == Json({"steps", "accuracy"}));
-  REQUIRE(data["rows"].size() == 3);
-  for (std::size_t i = 0; i < 3; ++i) {
-    CHECK(data["rows"][i]["error"] == table.rows[i].error);
-    CHECK(data["rows"][i]["setting"] == table.rows[i].setting);
-  }
-  CHECK(data["rows"][1]["failure"] == "stuck <b>");
-  CHECK(data["rows"][2]["command"] ==
-        "tether cost 'it'\\''s a ball.toml' --accuracies 0.001 --reference 0.001");
+  CHECK(page.find("stuck &#60;b&#62;") != std::string::npos);
+  const auto count = [&](const std::string& part) {
+    int n = 0;
+    for (std::size_t at = page.find(part); at != std::string::npos; at = page.find(part, at + 1))
+      ++n;
+    return n;
+  };
+  // In the table, and in the picture where the run got through.
+  const std::string command = "tether cost &#39;it&#39;\\&#39;&#39;s a ball.toml&#39; ";
+  CHECK(count("<code>" + command) == 3);
+  CHECK(count("<title>" + command) == 2);
+  CHECK(count(command + "--accuracies 0.001 --reference 0.001<") == 2);
+  CHECK(count(command + "--time-steps 0.004 --reference 0.001<") == 2);
+  CHECK(count(fmt::format("<td>{:.2e}<td>", table.rows[0].error)) == 1);
   // Alone it has the same reference, and so the same error.
   CostOptions alone;
   alone.steps = {4e-3};

@@ -7,7 +7,6 @@
 #include <tether/scene/joint.hpp>
 #include <tether/scene/place.hpp>
 #include <tether/scene/plan.hpp>
-#include <tether/scene/player.hpp>
 #include <tether/scene/run.hpp>
 #include <tether/scene/scene.hpp>
 #include <tether/scene/vary.hpp>

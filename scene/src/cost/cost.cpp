@@ -25,8 +25,7 @@ std::string no_events(const Scene& scene, const Plan& plan) {
   if (plan.engine == EngineKind::event) return {};
   if (!plan.no_event.empty()) return plan.no_event;
   const SteppingOptions o = scene.stepping.value_or(SteppingOptions{});
-  const bool bounces = std::any_of(scene.pairs.begin(), scene.pairs.end(),
-                                   [](const Pair& pair) { return pair.restitution > 0; });
+  const bool bounces = any_of(scene.pairs, [](const Pair& pair) { return pair.restitution > 0; });
   if (o.law != contact::Law::coulomb) return "the event engine has Coulomb's law only";
   if (bounces && o.restitution_law != contact::RestitutionLaw::newton)
     return "the event engine has Newton's restitution only";
@@ -120,8 +119,8 @@ CostRow measure_row(const Scene& scene, Setting setting, const std::vector<doubl
   row.steps = r.counts.steps;
   row.contact_problems = r.counts.contact_problems;
   row.seconds = r.seconds;
-  row.met = static_cast<int>(std::count_if(r.judgements.begin(), r.judgements.end(),
-                                           [](const Judgement& j) { return j.judged && j.met; }));
+  row.met = static_cast<int>(
+      count_if(r.judgements, [](const Judgement& j) { return j.judged && j.met; }));
   // Without the looks in between; the least of several: everything else on the machine only adds.
   double spent = 0;
   for (int repeat = 0; repeat < 5 && spent < 0.3 && row.failure.empty(); ++repeat) {

@@ -1,10 +1,12 @@
-// Tether: what accuracy costs, as a picture. SPDX-License-Identifier: BSD-3-Clause
+// Tether: what accuracy costs, as a picture and as a page for a browser. SPDX-License-Identifier:
+// BSD-3-Clause
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <tether/scene/cost.hpp>
 
 #include "picture/axes.hpp"
+#include "player/page_text.hpp"
 
 namespace tether::scene {
 
@@ -12,8 +14,36 @@ namespace {
 
 using namespace picture;
 
+std::string title_of(const Scene& scene) {
+  return (scene.name.empty() ? scene.file : scene.name) + ": what accuracy costs";
+}
+
+const char* option_of(CostMethod method) {
+  return method == CostMethod::steps      ? "--time-steps"
+         : method == CostMethod::accuracy ? "--accuracies"
+                                          : "--tolerances";
+}
+
+/// One word of a command line.
+std::string quoted(const std::string& word) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./+-";
+  const bool option = !word.empty() && word.front() == '-';
+  if (!word.empty() && !option && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string out = "'";
+  for (const char c : (option ? "./" : "") + word)
+    out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+std::string command_of(const Scene& scene, const CostTable& table, const CostRow& row) {
+  std::string out =
+      fmt::format("tether cost {} {} {}", quoted(scene.file), option_of(row.method), row.setting);
+  if (table.reference_setting) out += fmt::format(" --reference {}", *table.reference_setting);
+  return out;
+}
+
 constexpr double kWidth = 560, kHeight = 460;
-constexpr double kLeast = 1e-17;  // an error of zero has no logarithm
 
 /// Okabe and Ito: safe for colour-blind readers.
 constexpr std::array<const char*, 4> kMethodColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
@@ -65,8 +95,7 @@ void draw_level(Canvas& canvas, const Axes& axes, const Range& x, double error,
 }  // namespace
 
 std::string cost_picture(const Scene& scene, const CostTable& table, std::optional<double> wanted) {
-  const std::string title =
-      (scene.name.empty() ? scene.file : scene.name) + ": what accuracy costs";
+  const std::string title = title_of(scene);
   std::vector<double> times, errors;
   std::vector<Entry> entries;
   std::array<std::vector<const CostRow*>, 4> curves;
@@ -78,7 +107,7 @@ std::string cost_picture(const Scene& scene, const CostTable& table, std::option
                          kMethodColours[static_cast<std::size_t>(row.method)]});
     curve.push_back(&row);
     times.push_back(1e3 * row.seconds);
-    errors.push_back(std::max(row.error, kLeast));
+    errors.push_back(std::max(row.error, kLeastError));
   }
   if (wanted) errors.push_back(*wanted);
   const bool trust = table.reference_error > 1e-16;
@@ -93,14 +122,14 @@ std::string cost_picture(const Scene& scene, const CostTable& table, std::option
   axes.draw("processor time / ms", "largest error / m, rad");
   for (const auto& curve : curves)
     for (const CostRow* row : curve) {
-      const Vector2d p = axes.at(1e3 * row->seconds, std::max(row->error, kLeast));
+      const Vector2d p = axes.at(1e3 * row->seconds, std::max(row->error, kLeastError));
       canvas.block({p.x() - 5, p.y() - 5, p.x() + 5, p.y() + 5});
     }
   for (const auto& curve : curves) {
     if (curve.empty()) continue;
     std::vector<Vector2d> points;
     for (const CostRow* row : curve)
-      points.emplace_back(1e3 * row->seconds, std::max(row->error, kLeast));
+      points.emplace_back(1e3 * row->seconds, std::max(row->error, kLeastError));
     axes.curve(points, {kMethodColours[static_cast<std::size_t>(curve.front()->method)], 1.6, ""});
   }
   if (wanted) draw_level(canvas, axes, x, *wanted, "wanted " + short_number(*wanted), "#b00020");
@@ -108,14 +137,38 @@ std::string cost_picture(const Scene& scene, const CostTable& table, std::option
     draw_level(canvas, axes, x, table.reference_error, "trust in the reference", "#707070");
   for (const auto& curve : curves)
     for (const CostRow* row : curve) {
-      const Vector2d p = axes.at(1e3 * row->seconds, std::max(row->error, kLeast));
+      const Vector2d p = axes.at(1e3 * row->seconds, std::max(row->error, kLeastError));
+      canvas.begin_note(command_of(scene, table, *row));
       draw_mark(canvas, row->method, p);
+      canvas.end_note();
       canvas.text(short_number(row->setting), around(p, 11), axes.inside(), {11, "#404040"});
     }
   if (times.empty())
     canvas.text("no run got through", {{Vector2d(kWidth / 2, kHeight / 2), Anchor::middle}},
                 canvas.whole());
   return canvas.svg(title);
+}
+
+std::string cost_page(const Scene& scene, const CostTable& table, std::optional<double> wanted) {
+  using player::html_text;
+  std::string rows;
+  for (const CostRow& row : table.rows) {
+    rows += fmt::format("<tr><td>{}<td>{:g}", name(row.method), row.setting);
+    rows += row.failure.empty()
+                ? fmt::format("<td>{:.2e}<td>{:.4g}<td>{}<td>{:.1e}", row.error, 1e3 * row.seconds,
+                              row.steps, table.smooth ? row.drift : row.penetration)
+                : "<td class=\"why\" colspan=\"4\">fails: " + html_text(row.failure);
+    rows += fmt::format("<td class=\"why\"><code>{}</code></tr>\n",
+                        html_text(command_of(scene, table, row)));
+  }
+  const std::string picture = cost_picture(scene, table, wanted);
+  return player::page_head(title_of(scene), player::kCostStyle) +
+         fmt::format(
+             "<p>Errors against {}, which may be off by {:.1e}.</p>\n{}<table><thead><tr>"
+             "<th>method<th>setting<th>error<th>time / ms<th>steps<th>{}<th>command</tr></thead>\n"
+             "<tbody>\n{}</tbody></table>\n</body>\n</html>\n",
+             html_text(table.reference), table.reference_error,
+             picture.substr(picture.find("<svg")), table.smooth ? "drift" : "depth / m", rows);
 }
 
 }  // namespace tether::scene

@@ -12,7 +12,7 @@ namespace tether::scene::costs {
 namespace {
 
 // Comparisons are for what ends soon: more than these are a storm.
-constexpr int kMostEvents = 50000, kMostEventSteps = 1000000;
+constexpr int kMostEventSteps = 1000000;
 constexpr double kTimeRounding = 1e-12;  // relative: nearer times are equal
 
 Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q) {
@@ -85,8 +85,7 @@ Measured measure_once(const Scene& scene, const std::vector<double>& times,
     while (next < options.stops.size() &&
            engine.time() >= options.stops[next] * (1 - kTimeRounding)) {
       out.samples.times.push_back(options.stops[next]);
-      for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-        if (scene.bodies[b].fixed) continue;
+      for (const std::size_t b : scene.moving()) {
         // A time step ends at its boundary; the way to it is straight, and about one axis.
         const BodyState& state = engine.bodies()[b];
         const double late = engine.time() - options.stops[next];
@@ -145,9 +144,7 @@ std::vector<double> equal_times(double end, int count) {
 }
 
 std::vector<double> step_ends(const Scene& scene, double step, int least) {
-  const auto bodies = static_cast<double>(
-      std::max<std::ptrdiff_t>(1, std::count_if(scene.bodies.begin(), scene.bodies.end(),
-                                                [](const Body& b) { return !b.fixed; })));
+  const auto bodies = static_cast<double>(std::max<std::size_t>(1, scene.moving().size()));
   const double most = std::max(kMostPoses / bodies, static_cast<double>(least));
   const double stride = std::max(1.0, std::ceil(scene.end / step / most));
   std::vector<double> out;
@@ -186,7 +183,7 @@ Scene with_setting(const Scene& scene, CostMethod method, double setting) {
     out.event = scene.event.value_or(EventOptions{});
     out.event->otherwise = Otherwise::stop;
     out.event->tolerance = setting;
-    out.event->max_events = std::min(out.event->max_events, kMostEvents);
+    out.event->max_events = std::min(out.event->max_events, kMostPoses);
     out.event->max_steps = std::min(out.event->max_steps, kMostEventSteps);
     return out;
   }
@@ -229,12 +226,10 @@ Reference smooth_reference(const Scene& scene, double tolerance, const Times& ti
 // which are the reference then.
 Reference stepping_reference(const Scene& scene, double step, const Times& times,
                              const CostOptions& options) {
-  constexpr int kRuns = 4;
   std::vector<Samples> runs;
-  for (int k = 0; k < kRuns; ++k) {
-    const double h = step * (1 << k);
+  for (const double h : {step, 2 * step, 4 * step, 8 * step}) {
     Scene each = with_setting(scene, CostMethod::steps, h);
-    if (k > 0) each.stepping->on_failure = OnFailure::warn;
+    if (h > step) each.stepping->on_failure = OnFailure::warn;
     const Measured m = measure_once(each, times.all, options);
     if (!m.result.failure.empty())
       throw std::runtime_error(
@@ -242,9 +237,8 @@ Reference stepping_reference(const Scene& scene, double step, const Times& times
     runs.push_back(m.samples);
   }
   std::vector<Samples> limits;
-  for (int k = 0; k + 1 < kRuns; ++k)
-    limits.push_back(
-        extrapolated(runs[static_cast<std::size_t>(k)], runs[static_cast<std::size_t>(k) + 1]));
+  for (std::size_t k = 0; k + 1 < runs.size(); ++k)
+    limits.push_back(extrapolated(runs[k], runs[k + 1]));
   const auto apart = [&](const Samples& a, const Samples& b) {
     return distance(picked(a, times.own), b);
   };
@@ -266,18 +260,18 @@ Reference stepping_reference(const Scene& scene, double step, const Times& times
 /// The event engine at a tight tolerance, and how far a looser one is from it.
 std::optional<Reference> event_reference(const Scene& scene, double tolerance, const Times& times,
                                          const CostOptions& options) {
-  constexpr int kTries = 3;
-  for (int k = 0; k < kTries; ++k, tolerance *= 10) {
-    const Measured tight =
-        measure_once(with_setting(scene, CostMethod::events, tolerance), times.all, options);
-    const Measured loose =
-        measure_once(with_setting(scene, CostMethod::events, 10 * tolerance), times.all, options);
+  for (const double looser : {1, 10, 100}) {
+    const double of_tight = looser * tolerance;
+    const auto run = [&](double setting) {
+      return measure_once(with_setting(scene, CostMethod::events, setting), times.all, options);
+    };
+    const Measured tight = run(of_tight), loose = run(10 * of_tight);
     if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
     Reference out;
     out.samples = tight.samples;
     out.error = distance(picked(tight.samples, times.own), loose.samples);
     out.of_events = true;
-    out.what = fmt::format("the scene's events at a tolerance of {:g}", tolerance);
+    out.what = fmt::format("the scene's events at a tolerance of {:g}", of_tight);
     return out;
   }
   return std::nullopt;

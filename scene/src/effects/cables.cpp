@@ -357,7 +357,7 @@ class CableEffect : public Effect {
         length += piece;
         apart = apart && piece > 0;
         pulls = pulls || (points[k].body != points[k + 1].body &&
-                          (moves(scene, points[k].body) || moves(scene, points[k + 1].body)));
+                          (scene.moves(points[k].body) || scene.moves(points[k + 1].body)));
       }
       if (!apart)
         report.add(each.place, path + ": at", "", "a point must not be where the one before is");
@@ -420,14 +420,9 @@ class CableEffect : public Effect {
     return false;
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    const bool any = std::any_of(scene.springs.begin(), scene.springs.end(),
-                                 [](const Spring& each) { return each.cable.has_value(); });
+    const bool any =
+        any_of(scene.springs, [](const Spring& each) { return each.cable.has_value(); });
     return any ? std::make_unique<CableForces>(scene, bodies) : nullptr;
-  }
-
- private:
-  static bool moves(const Scene& scene, int body) {
-    return body >= 0 && !scene.bodies[at(body)].fixed;
   }
 };
 

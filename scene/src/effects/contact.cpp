@@ -3,6 +3,7 @@
 // The stepping engine takes contact from tether::contact. A pair that no table names is an error
 // where bodies of it can touch: nothing is mixed from single materials.
 
+#include "bounds.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
@@ -10,8 +11,6 @@ namespace tether::scene::effects {
 using namespace mechanics;
 
 namespace {
-
-constexpr std::size_t kMostColumns = 200;  // bodies that have some
 
 using Materials = std::pair<std::string, std::string>;
 
@@ -43,8 +42,7 @@ class ContactEffect : public Effect {
   }
   void check(const Scene& scene, files::Report& report) const override;
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = std::count_if(scene.pairs.begin(), scene.pairs.end(),
-                                     [](const Pair& pair) { return pair.touch; });
+    const auto count = count_if(scene.pairs, [](const Pair& pair) { return pair.touch; });
     if (count == 0) return;
     std::size_t triangles = 0;
     for (const Body& body : scene.bodies)
@@ -64,7 +62,7 @@ class ContactEffect : public Effect {
     std::size_t count = 0;
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
       const Body& body = scene.bodies[i];
-      if (body.fixed || body.material.empty() || ++count > kMostColumns) continue;
+      if (body.fixed || body.material.empty() || ++count > kMostInColumns) continue;
       add_columns_of(
           body.name + ".contact_f*_N", [i](const Forces& f) { return f.contact[i]; }, columns);
       add_columns_of(

@@ -22,8 +22,7 @@ class FrictionEffect : public Effect {
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;
     if (law == contact::Law::frictionless ||
-        std::none_of(scene.pairs.begin(), scene.pairs.end(),
-                     [](const Pair& pair) { return pair.friction > 0; }))
+        !any_of(scene.pairs, [](const Pair& pair) { return pair.friction > 0; }))
       return;
     lines.push_back(
         {"friction", fmt::format("{}, law {}", range(scene.pairs, &Pair::friction), word(law))});

@@ -79,13 +79,13 @@ class GradientForces : public PairForces<GradientItem> {
 class GravityGradientEffect : public Effect {
  public:
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = std::count_if(scene.central_gravity.begin(), scene.central_gravity.end(),
-                                     [](const CentralGravity& each) { return each.gradient; });
+    const auto count =
+        count_if(scene.central_gravity, [](const CentralGravity& each) { return each.gradient; });
     if (count > 0) lines.push_back({"gravity gradient", counted(count, "centre")});
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    const bool any = std::any_of(scene.central_gravity.begin(), scene.central_gravity.end(),
-                                 [](const CentralGravity& each) { return each.gradient; });
+    const bool any =
+        any_of(scene.central_gravity, [](const CentralGravity& each) { return each.gradient; });
     return any ? std::make_unique<GradientForces>(scene, bodies) : nullptr;
   }
 };

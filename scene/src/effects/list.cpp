@@ -26,15 +26,13 @@ std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
 
 bool has_joint_laws(const Scene& scene) {
   const auto& list = all();
-  return std::any_of(list.begin(), list.end(),
-                     [&](const Effect* each) { return each->has_joint_laws(scene); });
+  return any_of(list, [&](const Effect* each) { return each->has_joint_laws(scene); });
 }
 
 std::vector<double> kinks_of(const Scene& scene) {
   std::vector<double> times;
   for (const Effect* each : all()) each->add_kinks(scene, times);
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
+  sort_unique(times);
   times.erase(times.begin(), std::upper_bound(times.begin(), times.end(), 0.0));
   return times;
 }

@@ -7,6 +7,7 @@
 // Steps take the mean of the factor over their length: impulses of given forces are exact.
 #include <tether/linalg/pi.hpp>
 
+#include "bounds.hpp"
 #include "mechanics/effect.hpp"
 #include "numbers.hpp"
 
@@ -116,27 +117,16 @@ class LoadForce : public Force {
   std::vector<Load> loads_;  // on bodies that move
 };
 
-constexpr std::size_t kMostKnots = 100000;
-
 void read_table(files::Fields& in, LoadHistory& history) {
-  const files::Value* value = in.find("table");
-  const auto is_number = [](const files::Value& x) {
-    return x.kind() == files::Value::Kind::number && files::kAny.holds(x.number());
-  };
-  bool right = value->kind() == files::Value::Kind::array && !value->items().empty() &&
-               value->items().size() <= kMostKnots;
-  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
-    const std::vector<files::Value>& row = value->items()[k].items();
-    right = value->items()[k].kind() == files::Value::Kind::array && row.size() == 2 &&
-            is_number(row[0]) && is_number(row[1]) &&
-            (history.table.empty() || row[0].number() >= history.table.back().time);
-    if (right) history.table.push_back({row[0].number(), row[1].number()});
-  }
-  if (right) return;
+  for (const auto& [time, factor] : in.pairs("table", kMostListed))
+    history.table.push_back({time, factor});
+  const auto earlier = [](const Knot& a, const Knot& b) { return a.time < b.time; };
+  if (!history.table.empty() && std::is_sorted(history.table.begin(), history.table.end(), earlier))
+    return;
   history.table.clear();
   in.wrong("table", fmt::format("must be an array of up to {} [time (s), factor], no time before "
                                 "the one above it",
-                                kMostKnots));
+                                kMostListed));
 }
 
 void read_sine(files::Reader& r, files::Fields& in, LoadHistory& history) {
@@ -186,11 +176,9 @@ class LoadEffect : public Effect {
       return out.raw(
           "sine", fmt::format("{{ mean = {}, frequency = {}, phase_rad = {} }}", toml(history.mean),
                               toml(history.frequency), toml(history.phase)));
-    std::string rows;
-    for (const Knot& knot : history.table)
-      rows +=
-          fmt::format("{}[{}, {}]", rows.empty() ? "" : ", ", toml(knot.time), toml(knot.factor));
-    out.raw("table", "[" + rows + "]");
+    std::vector<std::array<double, 2>> rows;
+    for (const Knot& knot : history.table) rows.push_back({knot.time, knot.factor});
+    out.raw("table", toml(rows));
   }
   void check(const Scene& scene, files::Report& report) const override {
     for (const Load& load : scene.loads)
@@ -204,10 +192,9 @@ class LoadEffect : public Effect {
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const std::size_t count = scene.loads.size();
-    const auto in_time = std::count_if(scene.loads.begin(), scene.loads.end(),
-                                       [](const Load& load) { return load.history.has_value(); });
-    const auto in_body = std::count_if(scene.loads.begin(), scene.loads.end(),
-                                       [](const Load& load) { return load.in_body; });
+    const auto in_time =
+        count_if(scene.loads, [](const Load& load) { return load.history.has_value(); });
+    const auto in_body = count_if(scene.loads, [](const Load& load) { return load.in_body; });
     if (count > 0)
       lines.push_back(
           {"loads",

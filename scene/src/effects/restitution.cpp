@@ -21,12 +21,11 @@ class RestitutionEffect : public Effect {
     if (pair.touch) out.field("restitution", pair.restitution);
   }
   void plan(const Scene& scene, EngineKind kind, std::vector<PlannedEffect>& lines) const override {
-    const bool limits = std::any_of(scene.joints.begin(), scene.joints.end(),
-                                    [](const Joint& joint) { return joint.limits.has_value(); });
+    const bool limits =
+        any_of(scene.joints, [](const Joint& joint) { return joint.limits.has_value(); });
     if (kind != EngineKind::smooth && (limits || !scene.pairs.empty()))
       lines.push_back({"impacts", simultaneous_impacts_text(scene)});
-    if (std::any_of(scene.pairs.begin(), scene.pairs.end(),
-                    [](const Pair& pair) { return pair.restitution > 0; }))
+    if (any_of(scene.pairs, [](const Pair& pair) { return pair.restitution > 0; }))
       lines.push_back({"restitution", range(scene.pairs, &Pair::restitution)});
   }
   void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {

@@ -24,8 +24,7 @@ class RollingFrictionEffect : public Effect {
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const auto any = [&](double Pair::*value) {
-      return std::any_of(scene.pairs.begin(), scene.pairs.end(),
-                         [&](const Pair& pair) { return pair.*value > 0; });
+      return any_of(scene.pairs, [&](const Pair& pair) { return pair.*value > 0; });
     };
     if (any(&Pair::rolling))
       lines.push_back({"rolling friction", range(scene.pairs, &Pair::rolling) + " m"});

@@ -216,8 +216,7 @@ class SpringEffect : public Effect {
     return false;
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    if (std::all_of(scene.springs.begin(), scene.springs.end(),
-                    [](const Spring& each) { return each.cable.has_value(); }))
+    if (all_of(scene.springs, [](const Spring& each) { return each.cable.has_value(); }))
       return nullptr;
     return std::make_unique<SpringForces>(scene.springs, bodies);
   }

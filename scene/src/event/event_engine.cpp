@@ -331,15 +331,8 @@ void EventEngine::save(std::ostream& out) const {
 
 void EventEngine::restore(std::istream& in, Restore how) {
   binary::Archive io(in);
-  binary::Magic magic;
-  in.read(magic, sizeof magic);
-  if (in && std::equal(magic, magic + sizeof magic, kBodiesFirst)) {
-    std::vector<BodyState> bodies(bodies_.size());
-    double seconds = 0;
-    exchange_bodies(io, seconds, bodies);
-    in.read(magic, sizeof magic);
-  }
-  if (!in || !std::equal(magic, magic + sizeof magic, kMagic))
+  skip_bodies(io, in, bodies_.size());
+  if (!binary::begins(in, kMagic))
     throw std::runtime_error("this is not a state of the event engine");
   Driver::Memory m;
   double reached = 0;

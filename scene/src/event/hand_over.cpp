@@ -257,22 +257,14 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
   const std::string all{std::istreambuf_iterator<char>(in), {}};
   std::istringstream content(all);
   binary::Archive io(content);
-  binary::Magic magic;
-  std::vector<BodyState> bodies(scene_.bodies.size());
-  double seconds = 0;
-  content.read(magic, sizeof magic);
-  if (content && std::equal(magic, magic + sizeof magic, kBodiesFirst)) {
-    exchange_bodies(io, seconds, bodies);
-    content.read(magic, sizeof magic);
-  }
+  skip_bodies(io, content, scene_.bodies.size());
   all_events_.clear();
   hand_overs_.clear();
   closed_.clear();
   steps_.reset();
   steps_before_ = Counts();
-  const bool ever = std::equal(magic, magic + sizeof magic, kHandedOver);
   begin_events(event::Begin::later);
-  if (!content || !ever) {
+  if (!binary::begins(content, kHandedOver)) {
     content = std::istringstream(all);
     events_->restore(content, how);
   } else {

@@ -25,13 +25,12 @@ void check_bodies(const Scene& scene, Report& report) {
                  "must be neither empty nor \"world\", which is the ground");
     if (!names.insert(body.name).second)
       report.add(body.place, called(body) + ": name", "", "another body has it already");
-    const bool plane = std::any_of(body.shapes.begin(), body.shapes.end(),
-                                   [](const Shape& s) { return s.kind == ShapeKind::plane; });
+    const bool plane =
+        any_of(body.shapes, [](const Shape& s) { return s.kind == ShapeKind::plane; });
     if (plane && !body.fixed)
       report.add(body.place, called(body) + ": fixed", "",
                  "must be true: a plane is infinite and cannot move");
-    const bool mesh = std::any_of(body.shapes.begin(), body.shapes.end(),
-                                  [](const Shape& s) { return s.kind == ShapeKind::mesh; });
+    const bool mesh = any_of(body.shapes, [](const Shape& s) { return s.kind == ShapeKind::mesh; });
     if (mesh && !body.fixed)
       report.add(body.place, called(body) + ": fixed", "",
                  "must be true: a mesh is a surface without an inside, for what stands still");
@@ -90,8 +89,7 @@ void check_stepping(Fields& in, const Scene& scene, const SteppingOptions& o) {
   if (o.accuracy > 0) in.wrong("sleep", "goes with fixed steps: leave out accuracy, or sleep");
   if (!(scene.gravity && scene.gravity->norm() > 0))
     in.wrong("sleep", "is a part of sqrt(gravity * size), and the scene has no gravity");
-  if (std::any_of(scene.pairs.begin(), scene.pairs.end(),
-                  [](const Pair& pair) { return pair.rolling > 0 || pair.torsional > 0; }))
+  if (any_of(scene.pairs, [](const Pair& pair) { return pair.rolling > 0 || pair.torsional > 0; }))
     in.wrong("sleep", "does not go with rolling and torsional friction of pairs");
 }
 
@@ -224,14 +222,8 @@ Scene read(Value document, const std::string& name) {
 
 namespace tether::scene {
 
-namespace {
-
-constexpr std::size_t kLargestFile = std::size_t{256} << 20;
-
-}  // namespace
-
 Scene parse_scene(std::string_view text, const std::string& name) {
-  if (text.size() > kLargestFile) files::refuse({name, 0, 0}, "must be a file of at most 256 MiB");
+  if (text.size() > kLargestScene) files::refuse({name, 0, 0}, "must be a file of at most 256 MiB");
   try {
     return files::read(files::parse_document(text, name), name);
   } catch (const SceneError&) {
@@ -244,7 +236,7 @@ Scene parse_scene(std::string_view text, const std::string& name) {
 Scene read_scene(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) files::refuse({path, 0, 0}, "cannot be opened");
-  const std::string text = files::read_stream(in, kLargestFile);
+  const std::string text = files::read_stream(in, kLargestScene);
   if (in.bad()) files::refuse({path, 0, 0}, "cannot be read");
   return parse_scene(text, path);
 }

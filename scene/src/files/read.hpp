@@ -3,6 +3,7 @@
 
 #include <istream>
 
+#include "bounds.hpp"
 #include "toml/document.hpp"
 #include "toml/reader.hpp"
 
@@ -15,9 +16,9 @@ Scene read(Value document, const std::string& name);
 /// Checks across fields: names, pairs of materials, bodies that cannot move, times.
 void check(const Scene& scene, Report& report);
 
-constexpr std::size_t kMostElements = 100000;  // that one scene may have by repetition
-constexpr std::size_t kMostCopied = 3000000;   // values of TOML in them, some hundred bytes each
-constexpr std::size_t kBytesOfValue = 100;     // of texts that count as one value more
+constexpr std::size_t kMostCopied =
+    3000000;  // values of TOML in repetitions, some hundred bytes each
+constexpr std::size_t kBytesOfValue = 100;  // of texts that count as one value more
 
 /// Replaces each [[body]], [[joint]], [[spring]] and [[load]] that has `repeat` by its copies.
 /// Throws SceneError where a repetition is wrong or makes too many.

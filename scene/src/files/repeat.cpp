@@ -50,7 +50,7 @@ class Repetition {
     std::size_t all = 1;
     for (const Row& row : rows_) {
       all *= static_cast<std::size_t>(row.count);
-      if (all > kMostElements) wrong(fmt::format("makes more than {} elements", kMostElements));
+      if (all > kMostListed) wrong(fmt::format("makes more than {} elements", kMostListed));
     }
     count_ = all;
   }
@@ -91,10 +91,10 @@ class Repetition {
       const Value& v = each.value;
       if (each.key == "count") {
         counted = v.kind() == Value::Kind::number && v.whole() && v.number() >= 1 &&
-                  v.number() <= static_cast<double>(kMostElements);
+                  v.number() <= static_cast<double>(kMostListed);
         if (!counted)
           wrong(fmt::format("count = {}: must be a whole number from 1 to {}", shown(v),
-                            kMostElements));
+                            kMostListed));
         row.count = static_cast<long>(v.number());
       } else if (each.key == "step") {
         if (!is_vector(v)) wrong(fmt::format("step = {}: must be [x, y, z], m", shown(v)));
@@ -195,11 +195,11 @@ void repeat_elements(Value& document, const std::string& file) {
       const Repetition repetition(*repeat, fmt::format("{} {}", kind, k + 1), file);
       made += repetition.count();
       copied += repetition.count() * size_of(item);
-      if (made > kMostElements || copied > kMostCopied)
+      if (made > kMostListed || copied > kMostCopied)
         repetition.wrong(
             fmt::format("makes more than {} elements of the scene, or {} numbers and "
                         "texts in them",
-                        kMostElements, kMostCopied));
+                        kMostListed, kMostCopied));
       for (std::size_t n = 0; n < repetition.count(); ++n)
         items.push_back(repetition.copy(item, n));
     }

@@ -11,16 +11,6 @@ namespace tether::scene::files {
 
 namespace {
 
-std::vector<std::string> words_of(const std::string& path) {
-  std::vector<std::string> out(1);
-  for (const char c : path)
-    if (c == '.')
-      out.emplace_back();
-    else
-      out.back() += c;
-  return out;
-}
-
 [[noreturn]] void refuse_path(const std::string& path, const std::string& why) {
   throw std::invalid_argument(fmt::format("\"{}\": {}", path, why));
 }
@@ -40,7 +30,7 @@ bool is_array_of_tables(const Value& value) {
 
 class Path {
  public:
-  explicit Path(const std::string& path) : path_(path), words_(words_of(path)) {}
+  explicit Path(const std::string& path) : path_(path), words_(split(path, '.')) {}
 
   void set(Value& root, double value) const {
     if (words_.size() < 2) refuse_path(path_, "names a table only; e.g. stepping.step");

@@ -6,6 +6,7 @@
 #include <tether/linalg/convex_hull.hpp>
 #include <tether/linalg/pi.hpp>
 
+#include "bounds.hpp"
 #include "shape_type.hpp"
 
 namespace tether::scene {
@@ -61,7 +62,7 @@ Mesh mesh(const Shape& shape, int around, double half_plane) {
 double reach_of(const Body& body) {
   double reach = 0;
   for (const Shape& shape : body.shapes) {
-    if (shape.kind == ShapeKind::plane) return std::numeric_limits<double>::infinity();
+    if (shape.kind == ShapeKind::plane) return kInfinity;
     for (const Vector3d& p : mesh(shape, 8, 0).points) reach = std::max(reach, p.norm());
   }
   return reach;

@@ -13,6 +13,7 @@ struct Mesh {
   std::vector<std::size_t> single;
 };
 
+constexpr int kAround = 24;
 /// `around`: segments of a circle. A plane is cut to a square of the given half edge.
 Mesh mesh(const Shape& shape, int around, double half_plane);
 

@@ -13,9 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestFile = std::size_t{64} << 20;
 // Limits for all bodies together: a file may be named by many, and each reads it.
-constexpr std::size_t kMostBytes = 4 * kLargestFile, kMostOfScene = 10 * kMostTriangles;
+constexpr std::size_t kMostBytes = 4 * kLargestPart, kMostOfScene = 10 * kMostTriangles;
 
 // A scene from an untrusted source reads nothing but what lies beside it: no way out of its folder,
 // by a link either, and no device.
@@ -37,10 +36,10 @@ bool read_beside(Fields& in, Reader& r, const std::string& name, std::string& te
     return false;
   }
   std::ifstream stream(file, std::ios::binary);
-  text = read_stream(stream, kLargestFile);
+  text = read_stream(stream, kLargestPart);
   r.surface_bytes += text.size();
   r.surface_files.insert(file.string());
-  if (stream.bad() || !stream.eof() || text.size() > kLargestFile) {
+  if (stream.bad() || !stream.eof() || text.size() > kLargestPart) {
     in.wrong("file", "cannot be read, or is larger than 64 MiB");
     return false;
   }
@@ -95,8 +94,7 @@ Heights read_rows(Fields& in) {
     const std::vector<Value>& row = value->items()[k].items();
     if (k == 0) out.columns = static_cast<int>(row.size());
     right = row.size() >= 2 && static_cast<int>(row.size()) == out.columns &&
-            out.values.size() + row.size() <= kMostMeshPoints &&
-            std::all_of(row.begin(), row.end(), is_number);
+            out.values.size() + row.size() <= kMostListed && all_of(row, is_number);
     if (right)
       for (const Value& each : row) out.values.push_back(each.number());
   }
@@ -104,7 +102,7 @@ Heights read_rows(Fields& in) {
   in.wrong("heights",
            fmt::format("must be an array of rows of numbers, all of one length, at least "
                        "2 x 2, at most {}, m",
-                       kMostMeshPoints));
+                       kMostListed));
   return {};
 }
 
@@ -112,7 +110,7 @@ Heights read_rows(Fields& in) {
 Shape one_triangle() { return Shape::mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}); }
 
 bool in_range(const Shape& shape) {
-  return std::all_of(shape.points.begin(), shape.points.end(), [](const Eigen::Vector3d& p) {
+  return all_of(shape.points, [](const Eigen::Vector3d& p) {
     return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e100;
   });
 }
@@ -148,7 +146,7 @@ void read_mesh(Fields& in, Reader& r, Shape& shape) {
   if (in.has("points")) {
     if (!in.has("triangles"))
       return in.missing("triangles", "[[i, j, k], ...], numbers of points from 0");
-    read.points = in.points("points", 3, kMostMeshPoints);
+    read.points = in.points("points", 3, kMostListed);
     if (!read.points.empty()) read.triangles = read_triangles(in, read.points.size());
     if (read.points.empty() || read.triangles.empty()) return;
   } else {
@@ -166,7 +164,7 @@ void read_mesh(Fields& in, Reader& r, Shape& shape) {
     for (Eigen::Vector3d& p : read.points) p *= scale;
   if (!in_range(read))
     return in.wrong(in.has("file") ? "file" : "points", "reaches beyond 1e100 m");
-  if (std::all_of(read.triangles.begin(), read.triangles.end(), [&](const auto& t) {
+  if (all_of(read.triangles, [&](const auto& t) {
         const auto corner = [&](std::size_t k) { return read.points[linalg::at(t[k])]; };
         const Eigen::Vector3d a = corner(1) - corner(0), b = corner(2) - corner(0);
         return !(a.cross(b).stableNorm() > 0);

@@ -75,7 +75,7 @@ class Corners {
     const auto [at, fresh] =
         known_.emplace(std::array<double, 3>{p.x(), p.y(), p.z()}, out_.points.size());
     if (fresh) {
-      limit(out_.points.size() + 1, kMostMeshPoints, "points");
+      limit(out_.points.size() + 1, kMostListed, "points");
       out_.points.push_back(p);
     }
     return static_cast<int>(at->second);
@@ -160,7 +160,7 @@ TriangleSurface parse_obj(std::string_view text) {
   while (lines.next()) {
     const std::string_view key = lines.word();
     if (key == "v") {
-      limit(out.points.size() + 1, kMostMeshPoints, "points");
+      limit(out.points.size() + 1, kMostListed, "points");
       out.points.push_back(lines.point());
     } else if (key == "f") {
       std::vector<int> corners;
@@ -193,7 +193,7 @@ Heights parse_heights(std::string_view text) {
   while (lines.next()) {
     const std::size_t before = out.values.size();
     for (std::string_view word = lines.word(); !word.empty(); word = lines.word()) {
-      limit(out.values.size() + 1, kMostMeshPoints, "heights");
+      limit(out.values.size() + 1, kMostListed, "heights");
       out.values.push_back(lines.number(word));
     }
     const int columns = static_cast<int>(out.values.size() - before);

@@ -8,10 +8,12 @@
 #include <string_view>
 #include <vector>
 
+#include "bounds.hpp"
+
 namespace tether::scene {
 
 /// More belong to no scene.
-constexpr std::size_t kMostMeshPoints = 100000, kMostTriangles = 200000;
+constexpr std::size_t kMostTriangles = 2 * kMostListed;
 
 /// An error in a file, by line where it has lines.
 class SurfaceError : public std::runtime_error {

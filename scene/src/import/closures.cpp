@@ -1,5 +1,5 @@
 // Tether: closures of loops as joints of a scene. SPDX-License-Identifier: BSD-3-Clause
-#include "closures.hpp"
+#include "parts.hpp"
 
 #include <fmt/format.h>
 
@@ -55,12 +55,12 @@ void add_closures(const Model& model, const std::vector<Part>& parts,
     draft.joint_comments.push_back(fmt::format("line {}, closes a loop", each.line));
   }
   const auto is_moved = [](const Part& part) {
-    return std::any_of(part.joints.begin(), part.joints.end(), [](const PlacedJoint& joint) {
+    return any_of(part.joints, [](const PlacedJoint& joint) {
       return joint.value != joint.law.reference &&
              (joint.law.kind == MotionKind::hinge || joint.law.kind == MotionKind::slide);
     });
   };
-  if (!model.closures.empty() && std::any_of(parts.begin(), parts.end(), is_moved))
+  if (!model.closures.empty() && any_of(parts, is_moved))
     remarks.add("loops are closed where the joints start, not where the file has them at zero");
 }
 

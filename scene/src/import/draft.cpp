@@ -6,7 +6,6 @@
 #include <tether/linalg/pi.hpp>
 #include <tether/scene/plan.hpp>
 
-#include "closures.hpp"
 #include "parts.hpp"
 #include "toml/report.hpp"
 
@@ -16,15 +15,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kFullTurn = 2 * linalg::kPi;
 constexpr double kSmallBody = 1e-6;  // of the mass of the body that they carry
 constexpr double kNear = 1e-9;       // m: lines this near to each other meet
 
 using Chain = std::vector<PlacedJoint>;
 
 long count(const Chain& chain, MotionKind kind) {
-  return std::count_if(chain.begin(), chain.end(),
-                       [&](const PlacedJoint& each) { return each.law.kind == kind; });
+  return count_if(chain, [&](const PlacedJoint& each) { return each.law.kind == kind; });
 }
 
 /// Point in which the axes of two hinges meet.
@@ -109,7 +106,7 @@ void add_laws(const PlacedJoint& placed, const ImportOptions& options, Joint& jo
   if (!law.limits) return;
   const double lower = law.limits->first - placed.value, upper = law.limits->second - placed.value;
   const bool turns = law.kind == MotionKind::hinge;
-  if (turns && !(upper - lower < kFullTurn))
+  if (turns && !(upper - lower < 2 * linalg::kPi))
     return remarks.add("limits of a full turn or more", law.name);
   if (!(lower <= 0 && upper >= 0 && lower < upper))
     return remarks.add("limits that the start is beyond", law.name);
@@ -192,9 +189,8 @@ class Drafting {
     add_contacts();
     make_unique();
     const Scene& scene = draft_.scene;
-    const bool laws = std::any_of(scene.joints.begin(), scene.joints.end(), [](const Joint& each) {
-      return each.limits || each.friction > 0;
-    });
+    const bool laws =
+        any_of(scene.joints, [](const Joint& each) { return each.limits || each.friction > 0; });
     if (model_.step > 0 && (laws || !scene.pairs.empty()))
       draft_.scene.stepping.emplace().step = model_.step;
     return std::move(draft_);
@@ -356,7 +352,7 @@ class Drafting {
       for (auto b = a; b != moving.end(); ++b) add(*a, *b);
     }
     const std::vector<Pair>& pairs = draft_.scene.pairs;
-    if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& pair) { return pair.touch; }))
+    if (!any_of(pairs, [](const Pair& pair) { return pair.touch; }))
       return draft_.scene.pairs.clear();
     for (const auto& [body, name] : material_of)
       draft_.scene.bodies[static_cast<std::size_t>(body)].material = *name;

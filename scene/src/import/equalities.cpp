@@ -1,11 +1,11 @@
 // Tether: <equality> of MJCF. SPDX-License-Identifier: BSD-3-Clause
 //
 // An equality of two joints, y - y0 = a0 + a1 (x - x0), is y = a1 x + (y0 + a0 - a1 x0).
-#include "equalities.hpp"
+#include "xml.hpp"
 
 #include <algorithm>
 
-namespace tether::scene::import::mjcf {
+namespace tether::scene::import {
 
 namespace {
 
@@ -80,4 +80,4 @@ bool read_equality(const Node& node, Model& model, Problems& problems) {
   return true;
 }
 
-}  // namespace tether::scene::import::mjcf
+}  // namespace tether::scene::import

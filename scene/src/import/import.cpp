@@ -23,12 +23,10 @@ std::string in_comment(std::string text) {
 std::string heading(const Model& model, const std::string& file, const Draft& draft,
                     const std::vector<std::string>& remarks) {
   const Scene& scene = draft.scene;
-  std::size_t moving = 0;
-  for (const Body& body : scene.bodies) moving += !body.fixed;
   std::vector<std::string> lines{
       fmt::format("{}: from {} ({}) by tether import. Moving bodies: {}, joints: {}.",
-                  model.name.empty() ? "A robot" : model.name, file, model.format, moving,
-                  scene.joints.size()),
+                  model.name.empty() ? "A robot" : model.name, file, model.format,
+                  scene.moving().size(), scene.joints.size()),
       "Positions are those of the centres of mass, at the start; units are SI."};
   if (!remarks.empty()) lines.insert(lines.end(), {"", "Left out or changed:"});
   for (const std::string& remark : remarks) lines.push_back("  " + remark);

@@ -8,7 +8,6 @@
 #include <tether/linalg/shortest_turn.hpp>
 #include <tether/linalg/symmetric_eigen.hpp>
 
-#include "equalities.hpp"
 #include "geometry/mass.hpp"
 #include "robot.hpp"
 #include "xml.hpp"
@@ -34,9 +33,6 @@ struct Settings {
   /// Attributes of `element` in a class ("": the outermost). Reports a class that is not there.
   const Attributes* defaults(const Node& node, const std::string& name, Problems& problems) const;
 };
-
-/// Reads <compiler>, <option> and <default> below the root; gravity and step go to the model.
-Settings read_settings(const Node& root, Model& model, Problems& problems);
 
 /// One of quat, axisangle, euler, xyaxes, zaxis; none: the identity.
 Eigen::Quaterniond read_orientation(Tag& tag, const Settings& settings);
@@ -90,7 +86,6 @@ void read_option(const Node& node, Model& model, Problems& problems) {
   }
 }
 
-constexpr std::size_t kMostAttributes = 100;  // of an element; MJCF has 40
 constexpr std::size_t kMostInClasses = 1000000;
 
 std::size_t size_of(const std::map<std::string, Attributes>& elements) {
@@ -257,6 +252,7 @@ const Attributes* Settings::defaults(const Node& node, const std::string& name,
   return of == found->second.end() ? nullptr : &of->second;
 }
 
+/// Reads <compiler>, <option> and <default> below the root; gravity and step go to the model.
 Settings read_settings(const Node& root, Model& model, Problems& problems) {
   Settings out;
   model.gravity = Vector3d(0, 0, -9.81);
@@ -308,9 +304,6 @@ struct Geom {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< in the frame of the body
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre, axes of the body
 };
-
-Geom read_geom(const Node& node, const std::string& class_name, const Settings& settings,
-               Problems& problems, Remarks& remarks);
 
 // Sizes of MJCF are halves: of edges, of the height of a cylinder, of the way between the centres
 // of a capsule's caps.
@@ -622,7 +615,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
     }
   }
   for (const Node* each : equalities)
-    if (!mjcf::read_equality(*each, model, problems))
+    if (!read_equality(*each, model, problems))
       model.remarks.add(fmt::format("<{}> in <equality>", each->Name()),
                         each->Attribute("name") != nullptr ? name_or_line(*each) : "");
   if (!has_world) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");

@@ -174,10 +174,8 @@ void drop_round_off(std::vector<Part>& parts, Remarks& remarks) {
 
 /// A scene needs something that moves.
 void check_moves(const Model& model, const std::vector<Part>& parts, Problems& problems) {
-  if (std::any_of(parts.begin(), parts.end(),
-                  [](const Part& part) { return !part.gone && !part.fixed(); }))
-    return;
-  const bool joints = std::any_of(parts.begin(), parts.end(), [](const Part& p) { return p.gone; });
+  if (any_of(parts, [](const Part& part) { return !part.gone && !part.fixed(); })) return;
+  const bool joints = any_of(parts, [](const Part& p) { return p.gone; });
   problems.add(model.links.empty() ? 1 : model.links.front().line, "", "",
                joints ? "nothing that moves has mass: its links need an <inertial>"
                       : "nothing moves while the base is fixed: --base free lets it");

@@ -52,4 +52,9 @@ void add_joints(const Part& part, int body, int on, const ImportOptions& options
 Draft make_draft(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
                  Remarks& remarks);
 
+/// Adds a ball or fixed joint for each closure of the model, at the start. `body_of`: of each part,
+/// -1: the world.
+void add_closures(const Model& model, const std::vector<Part>& parts,
+                  const std::vector<int>& body_of, Draft& draft, Remarks& remarks);
+
 }  // namespace tether::scene::import

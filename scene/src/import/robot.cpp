@@ -69,8 +69,7 @@ std::vector<std::string> Remarks::lines() const {
   std::vector<std::string> out;
   for (const Line& line : lines_) {
     std::vector<std::string> names = line.names;
-    std::sort(names.begin(), names.end());
-    names.erase(std::unique(names.begin(), names.end()), names.end());
+    sort_unique(names);
     if (!names.empty())
       out.push_back(fmt::format("{}: {}{}", line.what, fmt::join(names, ", "),
                                 line.names.size() < kMostNames ? "" : ", ..."));

@@ -1,5 +1,6 @@
 // Tether: XML elements with checked attributes. SPDX-License-Identifier: BSD-3-Clause
 #include "xml.hpp"
+#include "bounds.hpp"
 
 #include <fmt/format.h>
 
@@ -10,33 +11,12 @@ namespace tether::scene::import {
 
 namespace {
 
-constexpr std::size_t kLongestShown = 60;
-constexpr std::size_t kLargestText = std::size_t{64} << 20;
-constexpr int kMostAttributes =
-    100;  // of an element; MJCF has 40. The parser compares each with all
 constexpr std::size_t kLongestName = 200;  // bytes; names stand in names and remarks made of them
-
-/// The length of the UTF-8 sequence at the start of `text`; 0: it is none.
-std::size_t sequence(std::string_view text) {
-  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  const std::size_t size = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-  if (first < 0xc2 || first > 0xf4 || text.size() < size) return 0;
-  unsigned code = first & (0xffU >> (size + 1));
-  for (std::size_t k = 1; k < size; ++k) {
-    if ((byte(k) & 0xc0U) != 0x80) return 0;
-    code = code << 6U | (byte(k) & 0x3fU);
-  }
-  const bool overlong = code < (size == 2 ? 0x80U : size == 3 ? 0x800U : 0x10000U);
-  const bool surrogate = code >= 0xd800 && code < 0xe000;
-  return overlong || surrogate || code > 0x10ffff ? 0 : size;
-}
 
 /// -1: all of it is UTF-8 without a zero; else the place of the first byte that is not.
 long bad_byte(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
-    const std::size_t size = sequence(text.substr(i));
+    const std::size_t size = files::character_at(text.substr(i));
     if (size == 0 || text[i] == '\0') return static_cast<long>(i);
     i += size;
   }
@@ -69,7 +49,8 @@ std::vector<std::string_view> words_of(std::string_view text) {
 std::string shortened(std::string_view text) {
   if (text.size() <= kLongestShown) return fmt::format("\"{}\"", text);
   std::size_t end = 0;  // no sequence is cut
-  while (end < kLongestShown) end += std::max<std::size_t>(1, sequence(text.substr(end)));
+  while (end < kLongestShown)
+    end += std::max<std::size_t>(1, files::character_at(text.substr(end)));
   return fmt::format("\"{}...\"", text.substr(0, end));
 }
 
@@ -143,7 +124,7 @@ Document::Document(std::string_view text, Problems& problems) {
     return 1 +
            static_cast<int>(std::count(begin, begin + static_cast<std::ptrdiff_t>(place), '\n'));
   };
-  if (text.size() > kLargestText) problems.add(1, "", "", "must be a file of at most 64 MiB");
+  if (text.size() > kLargestPart) problems.add(1, "", "", "must be a file of at most 64 MiB");
   if (const long bad = problems.clean() ? bad_byte(text) : -1; bad >= 0)
     problems.add(line_of(static_cast<std::size_t>(bad)), "", "",
                  "is not UTF-8: an XML file in another encoding, or no XML at all");

@@ -15,6 +15,9 @@ namespace tether::scene::import {
 
 using Node = tinyxml2::XMLElement;
 
+/// An element has no more; in MJCF they are 40. The parser compares each with all.
+constexpr std::size_t kMostAttributes = 100;
+
 /// Collects what is wrong in a file, each with its line.
 class Problems : public files::Report {
  public:
@@ -92,5 +95,9 @@ Model read_urdf(const Node& root, Problems& problems);
 
 /// `root`: <mujoco>. Problems are reported; the model is of use where there are none.
 Model read_mjcf(const Node& root, Problems& problems);
+
+/// Reads an element below <equality> of MJCF: connect and weld become closures, joint becomes a
+/// mimic. False: it is none of them. After all of the joints.
+bool read_equality(const Node& node, Model& model, Problems& problems);
 
 }  // namespace tether::scene::import

@@ -66,8 +66,7 @@ void JointRows::place_bodies(const Bodies& bodies) {
       if (slot(body) >= 0) slots[at(row.row)].push_back(slot(body));
   });
   for (std::vector<int>& each : slots) {
-    std::sort(each.begin(), each.end());
-    each.erase(std::unique(each.begin(), each.end()), each.end());
+    sort_unique(each);
   }
   const auto place = [&](auto& kind) {
     for (auto& row : kind) {

@@ -58,7 +58,7 @@ bool is_driven(const Joint& joint) { return joint.motion.has_value(); }
 class PrescribedMotion : public Effect {
  public:
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), is_driven);
+    const auto count = count_if(scene.joints, is_driven);
     if (count > 0) lines.push_back({"prescribed motion", counted(count, "joint")});
   }
   void check(const Scene& scene, files::Report& report) const override {
@@ -87,9 +87,7 @@ class PrescribedMotion : public Effect {
       joint.motion->frequency *= units.time;
     }
   }
-  bool does_work(const Scene& scene) const override {
-    return std::any_of(scene.joints.begin(), scene.joints.end(), is_driven);
-  }
+  bool does_work(const Scene& scene) const override { return any_of(scene.joints, is_driven); }
 };
 
 }  // namespace

@@ -44,8 +44,7 @@ std::string counted(Integer count, const char* one) {
 
 /// From the centre of a moving body to a point, m.
 inline void take_arm(const Scene& scene, int body, const Vector3d& point, Largest& length) {
-  if (body < 0 || scene.bodies[at(body)].fixed) return;
-  length.take((point - scene.bodies[at(body)].position).norm());
+  if (scene.moves(body)) length.take((point - scene.bodies[at(body)].position).norm());
 }
 
 /// A column of the table of a run. The forces are empty unless the output of the scene has them.

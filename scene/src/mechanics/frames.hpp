@@ -10,6 +10,8 @@
 #include <tether/linalg/index.hpp>
 #include <unsupported/Eigen/AutoDiff>
 
+#include "lists.hpp"
+
 namespace tether::scene::mechanics {
 
 using linalg::at;

@@ -44,9 +44,7 @@ struct Momenta {
   std::string pushed_by;                     ///< the first other force from outside; empty: none
 
   /// -1, the world, and fixed bodies.
-  bool is_outside(int body) const {
-    return body < 0 || scene.bodies[static_cast<std::size_t>(body)].fixed;
-  }
+  bool is_outside(int body) const { return !scene.moves(body); }
   bool holds_outside(int first, int second) const {
     return is_outside(first) || is_outside(second);
   }

@@ -133,4 +133,14 @@ void exchange_bodies(binary::Archive& io, double& time, Bodies& bodies) {
   }
 }
 
+/// Reads the bodies that a state of events begins with, which it has once more. Throws
+/// std::runtime_error where it does not.
+inline void skip_bodies(binary::Archive& io, std::istream& in, std::size_t count) {
+  if (!binary::begins(in, kBodiesFirst))
+    throw std::runtime_error("this is not a state of the event engine");
+  std::vector<BodyState> bodies(count);
+  double seconds = 0;
+  exchange_bodies(io, seconds, bodies);
+}
+
 }  // namespace tether::scene

@@ -43,18 +43,6 @@ std::vector<std::string> inputs_of(const Scene& scene) {
   return out;
 }
 
-void check_page_name(const std::string& html, const std::vector<std::string>& others) {
-  if (!names_file(html))
-    throw std::invalid_argument(fmt::format("html = \"{}\": must name a file", html));
-  if (is_device(html)) return;
-  for (const std::string& each : others)
-    for (const char* with : {"", ".new", ".lock"})
-      if (!each.empty() &&
-          (identity(each + with) == identity(html) || identity(html + with) == identity(each)))
-        throw std::invalid_argument(
-            fmt::format("html = \"{}\": this file is an input or another output", html));
-}
-
 namespace {
 
 constexpr std::size_t kLongestHead = std::size_t{1} << 16;  // bytes; of a sweep over many numbers

@@ -17,10 +17,6 @@ bool is_device(const std::string& file);
 /// The scene and what was read with it.
 std::vector<std::string> inputs_of(const Scene& scene);
 
-/// Throws std::invalid_argument if a page is to be written over one of the others, which may be
-/// empty.
-void check_page_name(const std::string& html, const std::vector<std::string>& others);
-
 // By these a later run knows which files it may replace.
 constexpr const char* kRecordsHead =
     "time_s,kinetic_energy_J,potential_energy_J,energy_J,energy_change_J,momentum_x,momentum_y,"

@@ -1,5 +1,6 @@
 // Tether: axes of a picture. SPDX-License-Identifier: BSD-3-Clause
 #include "axes.hpp"
+#include "bounds.hpp"
 
 #include <fmt/format.h>
 
@@ -77,7 +78,7 @@ std::string short_number(double value) {
 }
 
 Range range_of(const std::vector<double>& values, bool logarithmic) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
+  double low = kInfinity, high = -low;
   for (const double value : values) {
     if (!std::isfinite(value) || (logarithmic && !(value > 0))) continue;
     low = std::min(low, value);

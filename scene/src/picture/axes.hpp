@@ -5,6 +5,8 @@
 
 namespace tether::scene::picture {
 
+constexpr double kLeastError = 1e-17;  // what is below, and zero, lies on the edge of a picture
+
 struct Range {
   double low = 0, high = 1;
   bool logarithmic = false;  // low > 0 then

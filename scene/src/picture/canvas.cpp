@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "output/names.hpp"
+#include "toml/report.hpp"
 
 namespace tether::scene::picture {
 
@@ -20,32 +21,11 @@ constexpr const char* kHatch =
     "patternTransform=\"rotate(45)\"><line x1=\"0\" y1=\"0\" x2=\"0\" y2=\"6\" "
     "stroke=\"#909090\" stroke-width=\"1.6\"/></pattern></defs>\n";
 
-/// Bytes of the character of UTF-8 that begins here; 0: there is none.
-std::size_t character_at(std::string_view text) {
-  const auto byte = [&](std::size_t k) {
-    return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u;
-  };
-  const unsigned first = byte(0);
-  const std::size_t count = first < 0x80                    ? 1
-                            : first >= 0xc2 && first < 0xe0 ? 2
-                            : first >= 0xe0 && first < 0xf0 ? 3
-                            : first >= 0xf0 && first < 0xf5 ? 4
-                                                            : 0;
-  for (std::size_t k = 1; k < count; ++k)
-    if ((byte(k) & 0xc0u) != 0x80) return 0;
-  // Longer than needed, half of a pair, beyond the last one, or no character of XML.
-  if ((first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) >= 0xa0) ||
-      (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) >= 0x90) ||
-      (first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe))
-    return 0;
-  return count;
-}
-
 /// Its characters; what is none becomes the sign for that.
 std::vector<std::string> characters(std::string_view text) {
   std::vector<std::string> out;
   while (!text.empty()) {
-    const std::size_t count = character_at(text);
+    const std::size_t count = files::character_at(text);
     out.emplace_back(count > 0 ? std::string(text.substr(0, count)) : "\xef\xbf\xbd");
     text.remove_prefix(std::max<std::size_t>(count, 1));
   }
@@ -78,13 +58,12 @@ std::string corners(const std::vector<Vector2d>& points) {
 
 /// Viewers reckon in 32 bits: what is far outside is left out.
 bool drawable(const std::vector<Vector2d>& points) {
-  return std::all_of(points.begin(), points.end(), [](const Vector2d& p) {
-    return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e6;
-  });
+  return all_of(points,
+                [](const Vector2d& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e6; });
 }
 
 bool is_free(const Box& box, const std::vector<Box>& of) {
-  return std::none_of(of.begin(), of.end(), [&](const Box& each) { return each.meets(box); });
+  return !any_of(of, [&](const Box& each) { return each.meets(box); });
 }
 
 }  // namespace
@@ -141,6 +120,10 @@ void Canvas::begin_clip(const Box& box) {
 }
 
 void Canvas::end_clip() { drawn_ += "</g>\n"; }
+
+void Canvas::begin_note(const std::string& text) {
+  drawn_ += fmt::format("<g><title>{}</title>\n", escaped(text));
+}
 
 void Canvas::avoid(const Vector2d& from, const Vector2d& to) {
   constexpr double kPart = 4;

@@ -67,6 +67,9 @@ class Canvas {
   /// Drawings between the two calls are seen inside of the box only.
   void begin_clip(const Box& box);
   void end_clip();
+  /// Drawings between the two calls tell the text where they are pointed at.
+  void begin_note(const std::string& text);
+  void end_note() { end_clip(); }
 
   /// Texts keep off the box.
   void block(const Box& box) { taken_.push_back(box); }

@@ -5,6 +5,7 @@
 #include <tether/linalg/convex_hull.hpp>
 
 #include "axes.hpp"
+#include "bounds.hpp"
 #include "geometry/shape_type.hpp"
 #include "joints/joint_type.hpp"
 
@@ -98,9 +99,7 @@ class Drawing {
   bool is_drawn(int body) const {
     return body >= 0 && static_cast<std::size_t>(body) < last_.size();
   }
-  bool moves(int body) const {
-    return is_drawn(body) && !scene_.bodies[static_cast<std::size_t>(body)].fixed;
-  }
+  bool moves(int body) const { return is_drawn(body) && scene_.moves(body); }
   const char* colour_of(std::size_t b) const {
     return scene_.bodies[b].fixed ? "#b0b0b0" : kColours[b % kColours.size()];
   }
@@ -124,7 +123,7 @@ class Drawing {
         continue;
       }
       const bool round = type_of(shape.kind).is_round();
-      const Mesh m = mesh(shape, 24, view_.half_plane());
+      const Mesh m = mesh(shape, kAround, view_.half_plane());
       std::vector<Vector2d> points;
       for (const Vector3d& p : m.points) points.push_back(view_.pixel(pose.position + R * p));
       if (shape.kind == ShapeKind::mesh) {
@@ -235,7 +234,7 @@ class Drawing {
   bool draw_path(std::size_t b) {
     std::map<std::pair<long, long>, std::size_t> visited;  // cells of the picture, and when first
     std::vector<std::vector<Vector2d>> parts(1);
-    Vector2d before = Vector2d::Constant(std::numeric_limits<double>::infinity());
+    Vector2d before = Vector2d::Constant(kInfinity);
     double length = 0;
     bool broken = false;
     std::size_t count = 0;
@@ -400,9 +399,7 @@ class Drawing {
   const std::vector<const Poses*>& motion_;
   const Poses &first_, &last_;
   View view_;
-  bool names_many_ = static_cast<std::size_t>(
-                         std::count_if(scene_.bodies.begin(), scene_.bodies.end(),
-                                       [](const Body& body) { return !body.fixed; })) > kMostNames;
+  bool names_many_ = scene_.moving().size() > kMostNames;
 };
 
 }  // namespace

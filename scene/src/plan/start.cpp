@@ -1,6 +1,7 @@
 // Tether: what a scene begins with that its author may not have meant. SPDX-License-Identifier:
 // BSD-3-Clause
 
+#include "bounds.hpp"
 #include "geometry/mesh.hpp"
 #include "stepping/stepping_engine.hpp"
 
@@ -58,7 +59,6 @@ std::map<Bodies, double> depths_at_start(const Scene& scene) {
 }  // namespace
 
 std::vector<std::string> overlaps_at_start(const Scene& scene) {
-  constexpr std::size_t kTold = 5;
   constexpr double kRounded = 1e-2;  // of a size: places of three digits are nearer than that
   std::map<Bodies, double> depths = depths_at_start(scene);
   for (const Joint& joint : scene.joints)  // which let their bodies pass through each other

@@ -14,8 +14,8 @@ namespace {
 
 /// Doubles beyond the range of single precision stay at its border.
 float single(double x) {
-  constexpr double kMost = std::numeric_limits<float>::max();
-  return static_cast<float>(std::clamp(x, -kMost, kMost));
+  using Limits = std::numeric_limits<float>;
+  return static_cast<float>(std::clamp<double>(x, Limits::lowest(), Limits::max()));
 }
 
 void add(const Eigen::Vector3d& v, std::vector<float>& out) {

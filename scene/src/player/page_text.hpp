@@ -33,6 +33,5 @@ extern const std::string_view kStyle, kBody, kScript;
 
 // The page of `tether cost`.
 extern const std::string_view kCostStyle;
-extern const std::string_view kCostScript;
 
 }  // namespace tether::scene::player

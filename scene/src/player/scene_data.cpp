@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bounds.hpp"
 #include "geometry/shape_type.hpp"
 #include "joints/joint_type.hpp"
 
@@ -14,9 +15,8 @@ namespace {
 using Eigen::Vector3d;
 using Json = nlohmann::json;
 
-constexpr int kAround = 24, kAroundOfMany = 10;  // segments of a circle
-constexpr std::size_t kMany = 300;               // bodies
-constexpr std::size_t kMostDots = 64;            // single points of a shape that are shown
+constexpr int kAroundOfMany = 10;
+constexpr std::size_t kMostDots = 64;  // single points of a shape that are shown
 
 Json list(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 template <class Quaternion>
@@ -144,7 +144,7 @@ View view_of(const Scene& scene) {
 }
 
 Json scene_data(const Scene& scene, const std::vector<std::size_t>& moving, const View& view) {
-  Forms forms(scene.bodies.size() > kMany ? kAroundOfMany : kAround, view);
+  Forms forms(scene.bodies.size() > kManyBodies ? kAroundOfMany : kAround, view);
   std::map<std::size_t, std::size_t> number;  // of a moving body in the film
   for (std::size_t i = 0; i < moving.size(); ++i) number.emplace(moving[i], i);
   Json bodies = Json::array(), joints = Json::array(), springs = Json::array(),

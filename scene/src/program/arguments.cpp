@@ -21,20 +21,7 @@ std::optional<double> positive(const std::string& text) {
   return value && *value > 0 ? value : std::nullopt;
 }
 
-constexpr std::size_t kLargest = std::size_t{256} << 20;  // beyond it parse_scene refuses
-constexpr int kMostValues = 100000;
-
-std::string all_of(std::istream& in) { return files::read_stream(in, kLargest); }
-
-std::vector<std::string> split(const std::string& text, char at) {
-  std::vector<std::string> out(1);
-  for (const char c : text)
-    if (c == at)
-      out.emplace_back();
-    else
-      out.back() += c;
-  return out;
-}
+std::string all_of(std::istream& in) { return files::read_stream(in, kLargestScene); }
 
 [[noreturn]] void refuse(const std::string& word, const std::string& why) {
   throw std::invalid_argument(fmt::format("--vary {}: {}", word, why));
@@ -46,8 +33,8 @@ std::vector<double> range(const std::string& word, const std::vector<std::string
                               count = finite_number(parts[2]);
   if ((parts.size() == 4 && !logarithmic) || !from || !to || !count)
     refuse(word, "a range is FROM:TO:COUNT or FROM:TO:COUNT:log, e.g. 0.1:0.5:9");
-  if (*count != std::floor(*count) || *count < 2 || *count > kMostValues)
-    refuse(word, fmt::format("COUNT must be a whole number from 2 to {}", kMostValues));
+  if (*count != std::floor(*count) || *count < 2 || *count > static_cast<double>(kMostListed))
+    refuse(word, fmt::format("COUNT must be a whole number from 2 to {}", kMostListed));
   if (logarithmic && !(*from > 0 && *to > 0)) refuse(word, "both ends of log must be > 0");
   const int last = static_cast<int>(*count) - 1;
   std::vector<double> values;
@@ -145,11 +132,11 @@ VariedNumber read_varied(const std::string& word) {
   VariedNumber out;
   out.path = word.substr(0, equals);
   const std::string values = word.substr(equals + 1);
-  if (const auto parts = split(values, ':'); parts.size() == 3 || parts.size() == 4) {
+  if (const auto parts = files::split(values, ':'); parts.size() == 3 || parts.size() == 4) {
     out.values = range(word, parts);
     return out;
   }
-  for (const std::string& each : split(values, ',')) {
+  for (const std::string& each : files::split(values, ',')) {
     const std::optional<double> value = finite_number(each);
     if (!value) refuse(word, fmt::format("\"{}\" is not a finite number", each));
     out.values.push_back(*value);

@@ -8,6 +8,7 @@
 #include <tether/scene/plan.hpp>
 #include <tether/scene/words.hpp>
 
+#include "bounds.hpp"
 #include "commands.hpp"
 #include "toml/report.hpp"
 
@@ -96,7 +97,6 @@ void print_events(const Summary& s, const Counts& c) {
 }
 
 void print_hand_overs(const Scene& scene, const RunResult& r) {
-  constexpr std::size_t kTold = 5;
   for (std::size_t k = 0; k < std::min(kTold, r.hand_overs.size()); ++k) {
     const HandOver& each = r.hand_overs[k];
     fmt::print(
@@ -159,7 +159,6 @@ void print_summary(const Scene& scene, const RunResult& r) {
 void print_start(const Scene& scene) {
   for (const std::string& each : overlaps_at_start(scene))
     fmt::print("WARNING   {}\n", on_terminal(each));
-  constexpr std::size_t kTold = 20;
   const std::vector<std::string> names = bodies_out_of_touch(scene);
   if (names.empty()) return;
   const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kTold, names.size()));
@@ -180,10 +179,8 @@ void print_times(const RunResult& r, double wall) {
 
 void print_judgements(const Scene& scene, const RunResult& r) {
   if (scene.expect.empty()) return;
-  const auto met = std::count_if(r.judgements.begin(), r.judgements.end(),
-                                 [](const Judgement& j) { return j.judged && j.met; });
-  const auto beyond = std::count_if(r.judgements.begin(), r.judgements.end(),
-                                    [](const Judgement& j) { return j.beyond; });
+  const auto met = count_if(r.judgements, [](const Judgement& j) { return j.judged && j.met; });
+  const auto beyond = count_if(r.judgements, [](const Judgement& j) { return j.beyond; });
   fmt::print("expectations: {} of {} met{}\n", met, scene.expect.size(),
              beyond > 0 ? fmt::format(", {} beyond the end", beyond) : "");
   Table table({"", "t / s", "quantity", "of", "found", "expected", "error"});

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "bounds.hpp"
 #include "effects/list.hpp"
 #include "formats.hpp"
 #include "output/files.hpp"
@@ -125,7 +126,6 @@ class EventRecorder : public TableRecorder {
 };
 
 /// The table has the first of them: a million columns are of no use.
-constexpr std::size_t kMostBodies = 200;
 
 class CsvRecorder : public Recorder {
  public:
@@ -135,10 +135,9 @@ class CsvRecorder : public Recorder {
         forces_(run.scene.output.forces),
         has_steps_column_(run.plan.then_steps > 0) {
     const Scene& scene = run.scene;
-    for (std::size_t i = 0; i < scene.bodies.size(); ++i)
-      if (!scene.bodies[i].fixed) moving_.push_back(i);
+    moving_ = scene.moving();
     bodies_ = moving_.size();
-    moving_.resize(std::min(bodies_, kMostBodies));
+    moving_.resize(std::min(bodies_, kMostInColumns));
     for (const effects::Effect* each : effects::all()) each->add_columns(scene, columns_);
     const std::string first = header(scene);
     lacks_rows_ = run.resume.restarted;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bounds.hpp"
 #include "formats.hpp"
 #include "output/files.hpp"
 #include "picture/axes.hpp"
@@ -14,10 +15,8 @@ namespace {
 
 using namespace picture;
 
-constexpr std::size_t kMostDrawn = 300;     // bodies; of more, only the first
 constexpr std::size_t kMostRecords = 1024;  // kept; then every second one goes
 constexpr std::size_t kMostPoints = 200;    // of a curve
-constexpr double kLeastError = 1e-17;       // what is below lies on the edge
 constexpr Box kPicture{0, 0, 860, 440}, kScenePanel{12, 36, 432, 404};
 constexpr Box kEnergyPanel{506, 76, 846, 182}, kErrorPanel{506, 286, 846, 392};
 
@@ -38,7 +37,7 @@ class PictureRecorder : public Recorder {
   PictureRecorder(const std::string& file, const formats::Beginning& run)
       : scene_(run.scene), file_(file), start_energy_(run.start_energy) {
     check_writable(file);
-    bodies_ = std::min(scene_.bodies.size(), kMostDrawn);
+    bodies_ = std::min(scene_.bodies.size(), kManyBodies);
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {

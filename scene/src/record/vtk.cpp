@@ -78,7 +78,6 @@ using Eigen::Vector3d;
 
 /// Beyond it spheres are points with a radius (filter "Glyph"), not surfaces.
 constexpr std::size_t kMostSurfaces = 1000;
-constexpr int kAround = 24;
 
 void put(std::vector<float>& out, const Vector3d& v) {
   for (int i = 0; i < 3; ++i) out.push_back(static_cast<float>(v[i]));
@@ -232,57 +231,45 @@ class VtkRecorder : public Recorder {
     return out;
   }
 
+  template <class Item, class T>
+  using Members = std::vector<std::pair<const char*, T Item::*>>;
+
+  /// A point for each item, with these of its members.
+  template <class Item, class Place>
+  static PolyData cloud(const std::vector<Item>& all, Range of, Place place,
+                        const Members<Item, Vector3d>& vectors,
+                        const Members<Item, double>& scalars) {
+    PolyData out;
+    for (std::size_t k = of.first; k < of.last; ++k) {
+      out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
+      put(out.points, std::invoke(place, all[k]));
+    }
+    std::vector<float> values;
+    for (const auto& [name, member] : vectors) {
+      for (std::size_t k = of.first; k < of.last; ++k) put(values, all[k].*member);
+      out.vectors(name, std::exchange(values, {}));
+    }
+    for (const auto& [name, member] : scalars) {
+      for (std::size_t k = of.first; k < of.last; ++k) values.push_back(float(all[k].*member));
+      out.scalars(name, std::exchange(values, {}));
+    }
+    return out;
+  }
+
   PolyData contacts(const std::vector<ContactState>& all, Range of) const {
-    PolyData out;
-    std::vector<float> impulse, normal, gap, force, slip;
-    for (std::size_t k = of.first; k < of.last; ++k) {
-      const ContactState& c = all[k];
-      out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
-      put(out.points, c.point);
-      put(impulse, c.impulse);
-      put(normal, c.normal);
-      gap.push_back(static_cast<float>(c.gap));
-      put(force, c.force);
-      put(slip, c.slip);
-    }
-    out.vectors("impulse", impulse);
-    out.vectors("normal", normal);
-    out.scalars("gap", gap);
-    if (!forces_) return out;
-    out.vectors("force", force);
-    out.vectors("slip", slip);
-    return out;
+    using C = ContactState;
+    Members<C, Vector3d> vectors = {{"impulse", &C::impulse}, {"normal", &C::normal}};
+    if (forces_) vectors.insert(vectors.end(), {{"force", &C::force}, {"slip", &C::slip}});
+    return cloud(all, of, &C::point, vectors, {{"gap", &C::gap}});
   }
-
   static PolyData joints(const Forces& forces, Range of) {
-    PolyData out;
-    std::vector<float> force, moment, drive;
-    for (std::size_t k = of.first; k < of.last; ++k) {
-      const JointForce& each = forces.joints[k];
-      out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
-      put(out.points, each.at);
-      put(force, each.force);
-      put(moment, each.moment);
-      drive.push_back(static_cast<float>(each.drive));
-    }
-    out.vectors("force", force);
-    out.vectors("moment", moment);
-    out.scalars("drive", drive);
-    return out;
+    using J = JointForce;
+    return cloud(forces.joints, of, &J::at, {{"force", &J::force}, {"moment", &J::moment}},
+                 {{"drive", &J::drive}});
   }
-
-  // In the middle between its ends.
   static PolyData springs(const Forces& forces, Range of) {
-    PolyData out;
-    std::vector<float> tension;
-    for (std::size_t k = of.first; k < of.last; ++k) {
-      const SpringForce& each = forces.springs[k];
-      out.vertices.push_back(static_cast<std::int32_t>(out.vertices.size()));
-      put(out.points, 0.5 * (each.at + each.at_second));
-      tension.push_back(static_cast<float>(each.tension));
-    }
-    out.scalars("tension", tension);
-    return out;
+    const auto middle = [](const SpringForce& s) { return Vector3d(0.5 * (s.at + s.at_second)); };
+    return cloud(forces.springs, of, middle, {}, {{"tension", &SpringForce::tension}});
   }
 
   /// Takes over the frames of an earlier run, so that both make one film.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "bounds.hpp"
 #include "output/binary.hpp"
 
 namespace tether::scene {
@@ -26,8 +27,6 @@ void merge(const Event& from, Event& into) {
   into.stop = into.stop || from.stop;
   into.end = into.end || from.end;
 }
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<double> three(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 

@@ -344,8 +344,7 @@ class Run {
 }  // namespace
 
 bool RunResult::met() const {
-  return std::all_of(judgements.begin(), judgements.end(),
-                     [](const Judgement& j) { return j.beyond || (j.judged && j.met); });
+  return all_of(judgements, [](const Judgement& j) { return j.beyond || (j.judged && j.met); });
 }
 
 RunResult run(const Scene& scene, const RunOptions& options) { return Run(scene, options).go(); }

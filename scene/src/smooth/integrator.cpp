@@ -1,6 +1,7 @@
 // Tether: a smooth system in the hands of IDA and the projection. SPDX-License-Identifier:
 // BSD-3-Clause
 #include "integrator.hpp"
+#include "bounds.hpp"
 
 #include <sunlinsol/sunlinsol_spgmr.h>
 
@@ -53,7 +54,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
                    options.max_step);
   system.choose_rows(t, y.data(), tolerance_);
   // id is 1 where a component has a rate.
-  const FirstStep first{tolerance_, std::numeric_limits<double>::infinity(), id,
+  const FirstStep first{tolerance_, kInfinity, id,
                         [&](double at, Eigen::VectorXd& ahead, Eigen::VectorXd& rate) {
                           system_.complete(at, ahead, rate);
                         }};
@@ -210,9 +211,8 @@ std::string Integrator::failure(int flag) const {
     message += "Projection: " + projection->message() + ". ";
   const std::vector<std::string> joints = system_.dependent_joints(t_, y().data());
   for (std::size_t k = 0; k < joints.size(); ++k) {
-    constexpr std::size_t kNamed = 6;
-    if (k == kNamed) {
-      message += " and " + std::to_string(joints.size() - kNamed) + " more";
+    if (k == kTold) {
+      message += " and " + std::to_string(joints.size() - kTold) + " more";
       break;
     }
     message += (k == 0 ? "Joints \"" : ", \"") + joints[k] + "\"";

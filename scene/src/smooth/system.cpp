@@ -61,7 +61,7 @@ std::vector<std::string> System::dependent_joints(double t, const double* y) {
   gradient.factor(std::vector<char>(at(rows()), 1), kNear);
   for (const int row : gradient.dependent()) {
     const std::string name = rows_.joint_of(row);
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    if (!contains(names, name)) names.push_back(name);
   }
   return names;
 }
@@ -223,9 +223,7 @@ ida_projection::SparseJacobian System::sparse_row_jacobian() {
   ida_projection::SparseJacobian jacobian;
   jacobian.starts.push_back(0);
   for (int row = 0; row < first_invariant(); ++row) {
-    std::sort(slots[at(row)].begin(), slots[at(row)].end());
-    slots[at(row)].erase(std::unique(slots[at(row)].begin(), slots[at(row)].end()),
-                         slots[at(row)].end());
+    sort_unique(slots[at(row)]);
     for (const int slot : slots[at(row)])
       for (int j = 0; j < width(row); ++j) jacobian.columns.push_back(kBody * slot + j);
     jacobian.starts.push_back(static_cast<int>(jacobian.columns.size()));

@@ -19,6 +19,7 @@
 #include <chrono>
 #include <tether/ida_projection.hpp>
 
+#include "bounds.hpp"
 #include "joints/joint_rows.hpp"
 #include "smooth/rows/rows_in_use.hpp"
 #include "smooth/terms/forward_dynamics.hpp"
@@ -94,7 +95,7 @@ class System {
   /// The first time after t at which forces have a kink or jump; infinite: there is none.
   double next_kink(double t) const {
     const auto next = std::upper_bound(kinks_.begin(), kinks_.end(), t);
-    return next != kinks_.end() ? *next : std::numeric_limits<double>::infinity();
+    return next != kinks_.end() ? *next : kInfinity;
   }
   Diagnostics diagnostics(double t, const double* y);  ///< drift in SI, the rest in units()
   /// In units().

@@ -188,8 +188,7 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
     joints_ = joints.get();
     stepper_.add_joints(std::move(joints));
   }
-  if (std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                  [](const Body& body) { return body.surface.has_value(); }))
+  if (any_of(scene.bodies, [](const Body& body) { return body.surface.has_value(); }))
     for (const Body& body : scene.bodies) surface_.push_back(body.surface.value_or(SurfaceSpeed{}));
   add_forces(scene);
   read_bodies();
@@ -401,7 +400,7 @@ void SteppingEngine::begin_at(double time, const std::vector<BodyState>& states)
 }
 
 void SteppingEngine::restore(std::istream& in, Restore how) {
-  char magic[sizeof kMagic];
+  binary::Magic magic;
   in.read(magic, sizeof magic);
   if (in && how == Restore::near && std::memcmp(magic, kBodiesFirst, sizeof magic) == 0)
     return take_over(in);

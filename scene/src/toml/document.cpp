@@ -2,18 +2,27 @@
 //
 // The only file that includes toml++: it is heavy to compile.
 #include "document.hpp"
+#include "bounds.hpp"
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
-
-#include "nesting.hpp"
 
 namespace tether::scene::files {
 
 namespace {
 
-/// One pass over the characters. Depth here = parts of the table's header + parts of the keys and
-/// brackets that are open.
+/// Tables and arrays inside each other; a dotted key or header counts for all its parts, which the
+/// parser's own limit does not see though each is a table that it recurses into.
+struct Nesting {
+  int depth = 0;             ///< the deepest
+  int line = 1, column = 1;  ///< where it is reached first
+};
+
+constexpr int kDeepest = 64;
+
+/// One pass over the characters, up to kDeepest. Of a text that is not TOML it may say anything: no
+/// deeper than the part that the parser reads before it refuses. Depth here = parts of the table's
+/// header + parts of the keys and brackets that are open.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : text_(text) {}
@@ -274,15 +283,14 @@ std::optional<Value> parse_pieces(std::string_view text, const std::string& name
   return pieces.take();
 }
 
-constexpr std::size_t kShownText = 60, kShownItems = 8;
+constexpr std::size_t kShownItems = 8;
 
 std::string in_quotes(std::string_view text) {
-  return fmt::format("\"{}{}\"", text.substr(0, kShownText), text.size() > kShownText ? "..." : "");
+  return fmt::format("\"{}{}\"", text.substr(0, kLongestShown),
+                     text.size() > kLongestShown ? "..." : "");
 }
 
 }  // namespace
-
-Nesting nesting_of(std::string_view text) { return Scanner(text).scan(); }
 
 std::string shown(const Value& value) {
   switch (value.kind()) {
@@ -296,7 +304,7 @@ std::string shown(const Value& value) {
       std::string out = "[";
       for (std::size_t i = 0; i < value.items().size(); ++i) {
         if (i > 0) out += ", ";
-        if (i == kShownItems || out.size() > kShownText) return out + "...]";
+        if (i == kShownItems || out.size() > kLongestShown) return out + "...]";
         const Value& item = value.items()[i];
         out += item.kind() == Value::Kind::array ? "[...]" : shown(item);
       }
@@ -321,7 +329,7 @@ Entry* find_entry(Value& table, std::string_view key) {
 }
 
 Value parse_document(std::string_view text, const std::string& name) {
-  const Nesting nesting = nesting_of(text);
+  const Nesting nesting = Scanner(text).scan();
   if (nesting.depth > kDeepest)
     refuse(
         {name, nesting.line, nesting.column},

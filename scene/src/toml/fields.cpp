@@ -1,5 +1,6 @@
 // Tether: the fields of one table of a scene file. SPDX-License-Identifier: BSD-3-Clause
 #include "fields.hpp"
+#include "bounds.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +12,6 @@ namespace tether::scene::files {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kDegree = linalg::kPi / 180;
 // A unit vector may be off by its rounding; beyond it is normalised.
 constexpr double kUnitError = 1e-15;
@@ -38,7 +38,7 @@ Fields::Fields(const Value* table, std::string path, const std::string& file, Re
 }
 
 const Entry* Fields::entry(std::string_view key) {
-  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
+  if (!contains(known_, key)) known_.emplace_back(key);
   if (table_ == nullptr) return nullptr;
   for (const Entry& each : table_->entries())
     if (each.key == key) return &each;
@@ -148,7 +148,7 @@ std::string Fields::input_name(std::string_view key) { return inside(key, text(k
 std::string Fields::inside(std::string_view key, const std::string& file, const char* whose) {
   if (file.empty()) return "";
   const std::filesystem::path path(file);
-  const bool out = path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end();
+  const bool out = path.is_absolute() || contains(path, "..");
   bool odd = file.find_first_of("|<>\\*?:`$;&!") != std::string::npos || file.size() >= 200;
   for (const auto& part : path) {
     const std::string name = part.string();
@@ -170,8 +170,7 @@ std::vector<double> Fields::numbers(std::string_view key, const std::vector<std:
   if (found == nullptr) return {};
   const Value& value = found->value;
   std::vector<double> out;
-  bool right = value.kind() == Value::Kind::array &&
-               std::find(lengths.begin(), lengths.end(), value.items().size()) != lengths.end();
+  bool right = value.kind() == Value::Kind::array && contains(lengths, value.items().size());
   if (right)
     for (const Value& item : value.items()) {
       right = right && item.kind() == Value::Kind::number && kAny.holds(item.number());
@@ -240,6 +239,19 @@ std::vector<Eigen::Vector3d> Fields::points(std::string_view key, std::size_t le
   return {};
 }
 
+std::vector<std::array<double, 2>> Fields::pairs(std::string_view key, std::size_t most) {
+  const Value* value = find(key);
+  if (value == nullptr || value->items().size() > most) return {};
+  std::vector<std::array<double, 2>> out;
+  for (const Value& row : value->items()) {
+    if (row.items().size() != 2) return {};
+    for (const Value& x : row.items())
+      if (x.kind() != Value::Kind::number || !kAny.holds(x.number())) return {};
+    out.push_back({row.items()[0].number(), row.items()[1].number()});
+  }
+  return out;
+}
+
 double Fields::angle(const std::string& stem, double otherwise, std::string_view unit_end) {
   const std::string deg = stem + "deg", rad = stem + "rad";
   const Entry* in_deg = entry(deg);
@@ -296,7 +308,7 @@ std::vector<const Value*> Fields::tables(std::string_view key) {
 void Fields::finish() {
   if (table_ == nullptr) return;
   for (const Entry& each : table_->entries()) {
-    if (std::find(known_.begin(), known_.end(), each.key) != known_.end()) continue;
+    if (contains(known_, each.key)) continue;
     report_.add({place_.file, each.line, each.column}, field(each.key), shown(each.value),
                 "unknown key" + (report_.full() ? "" : hint(each.key, known_)));
   }

@@ -45,6 +45,8 @@ class Fields {
                               std::string_view unit);
   /// An array of vectors, `least` to `most` of them; empty if absent or wrong.
   std::vector<Eigen::Vector3d> points(std::string_view key, std::size_t least, std::size_t most);
+  /// An array of 1 to `most` rows [a, b]; nothing, and nothing reported, where it is none.
+  std::vector<std::array<double, 2>> pairs(std::string_view key, std::size_t most);
   /// An angle by the unit in its key: <stem>deg or <stem>rad; in radians.
   double angle(const std::string& stem, double otherwise, std::string_view unit_end = "");
   /// One of the words of E; nothing if it is absent or wrong.

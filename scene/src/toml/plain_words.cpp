@@ -3,6 +3,26 @@
 
 namespace tether::scene {
 
+std::size_t files::character_at(std::string_view text) {
+  const auto byte = [&](std::size_t k) {
+    return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u;
+  };
+  const unsigned first = byte(0);
+  const std::size_t count = first < 0x80                    ? 1
+                            : first >= 0xc2 && first < 0xe0 ? 2
+                            : first >= 0xe0 && first < 0xf0 ? 3
+                            : first >= 0xf0 && first < 0xf5 ? 4
+                                                            : 0;
+  for (std::size_t k = 1; k < count; ++k)
+    if ((byte(k) & 0xc0u) != 0x80) return 0;
+  // Longer than needed, half of a pair, beyond the last one, or no character of XML.
+  if ((first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) >= 0xa0) ||
+      (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) >= 0x90) ||
+      (first == 0xef && byte(1) == 0xbf && byte(2) >= 0xbe))
+    return 0;
+  return count;
+}
+
 std::string files::printable(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {

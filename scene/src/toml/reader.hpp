@@ -73,6 +73,17 @@ inline std::string read_stream(std::istream& in, std::size_t most) {
   return text;
 }
 
+/// The pieces of a text between these characters.
+inline std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> out(1);
+  for (const char c : text)
+    if (c == at)
+      out.emplace_back();
+    else
+      out.back() += c;
+  return out;
+}
+
 /// The field `name` of an element of [[kind]], which names it in messages from here on.
 std::string read_name(Fields& in, const std::string& kind);
 
@@ -84,15 +95,12 @@ void read_two_points(Fields& in, Eigen::Vector3d& first, Eigen::Vector3d& second
 template <class Connection>
 void check_connections(const Scene& scene, const std::vector<Connection>& all, const char* kind,
                        Report& report) {
-  const auto moves = [&](int body) {
-    return body >= 0 && !scene.bodies[static_cast<std::size_t>(body)].fixed;
-  };
   std::set<std::string> names;
   for (const Connection& each : all) {
     const std::string path = fmt::format("{} \"{}\"", kind, each.name);
     if (!names.insert(each.name).second)
       report.add(each.place, path + ": name", "", "another one has it already");
-    if (!moves(each.first) && !moves(each.second))
+    if (!scene.moves(each.first) && !scene.moves(each.second))
       report.add(each.place, path + ": bodies", "", "one of them must be able to move");
   }
 }

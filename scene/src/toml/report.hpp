@@ -5,6 +5,8 @@
 #include <tether/scene/files.hpp>
 #include <tuple>
 
+#include "lists.hpp"
+
 namespace tether::scene::files {
 
 /// Collects problems, so that a user sees them in one go; the reader goes on with a default.
@@ -32,6 +34,9 @@ class Report {
   std::vector<Problem> problems_;
 };
 
+/// Bytes of the character of UTF-8 that `text` begins with; 0: it begins with none, or with one
+/// that XML does not have.
+std::size_t character_at(std::string_view text);
 /// `text` with a question mark for all that a terminal obeys instead of showing it: control
 /// characters of ASCII and Unicode, and marks that turn the direction of what follows.
 std::string printable(std::string_view text);

@@ -55,6 +55,13 @@ std::string toml(const std::vector<std::array<int, 3>>& triangles) {
   return out + "]";
 }
 
+std::string toml(const std::vector<std::array<double, 2>>& rows) {
+  std::string out = "[";
+  for (const std::array<double, 2>& row : rows)
+    out += (out.size() > 1 ? ", " : "") + toml(std::vector<double>{row[0], row[1]});
+  return out + "]";
+}
+
 void Writer::raw(std::string_view key, const std::string& value, std::string_view comment) {
   text_ += fmt::format("{} = {}", key, value);
   if (!comment.empty()) text_ += fmt::format("  # {}", comment);

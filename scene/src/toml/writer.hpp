@@ -18,6 +18,7 @@ std::string toml(const std::string& text);
 std::string toml(const Eigen::Quaterniond& q);
 std::string toml(const std::vector<Eigen::Vector3d>& points);
 std::string toml(const std::vector<std::array<int, 3>>& triangles);
+std::string toml(const std::vector<std::array<double, 2>>& rows);
 template <class E>
 std::string toml_word(E value) {
   return toml(word(value));

@@ -72,12 +72,12 @@ struct CostTable {
 /// std::runtime_error if there is no reference.
 CostTable cost(const Scene& scene, const CostOptions& options = {});
 
-/// A page of HTML that needs nothing but a browser: error against time, and for each point the
+/// A page of HTML that needs nothing but a browser: error against time, and for each setting the
 /// command that repeats it. `wanted`: an error that is drawn as a line.
 std::string cost_page(const Scene& scene, const CostTable& table,
                       std::optional<double> wanted = {});
 
-/// The same as a picture (SVG).
+/// Its picture alone (SVG).
 std::string cost_picture(const Scene& scene, const CostTable& table,
                          std::optional<double> wanted = {});
 

@@ -13,6 +13,7 @@
 #include <tether/contact/stepping.hpp>
 #include <tether/export.hpp>
 #include <tether/linalg/eigen.hpp>
+#include <tether/linalg/index.hpp>
 #include <tether/scene/joint.hpp>
 #include <vector>
 
@@ -179,7 +180,7 @@ enum class EngineKind : std::uint8_t { automatic, smooth, stepping, event };
 
 /// Files that a run writes.
 struct Output {
-  /// Names of files by their formats: csv, vtk, svg, state; empty: not written.
+  /// Names of files by their formats: csv, vtk, svg, html, state; empty: not written.
   std::map<std::string, std::string, std::less<>> files;
   /// Name of the file of a format, which is added where there is none.
   std::string& operator[](std::string_view format) { return files[std::string(format)]; }
@@ -299,6 +300,16 @@ struct Scene {
   Output output;                            ///< files that a run writes
   std::vector<Expect> expect;               ///< what a run must find
   std::vector<std::string> surface_files;   ///< that were read with it; no output replaces them
+
+  /// Whether a body can; -1, the world, cannot.
+  bool moves(int body) const { return body >= 0 && !bodies[linalg::at(body)].fixed; }
+  /// The bodies that can.
+  std::vector<std::size_t> moving() const {
+    std::vector<std::size_t> out;
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      if (!bodies[b].fixed) out.push_back(b);
+    return out;
+  }
 };
 
 /// Whether steps take over where events cannot go on.

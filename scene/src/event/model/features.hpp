@@ -17,6 +17,7 @@
 
 #include <variant>
 
+#include "bounds.hpp"
 #include "round.hpp"
 #include "touch.hpp"
 
@@ -39,7 +40,7 @@ struct PointFeature {
     return t;
   }
   double margin(const Frame<double>&, const Frame<double>&, const Vector3d&) const {
-    return kNoBorder;
+    return kInfinity;
   }
 };
 
@@ -83,7 +84,7 @@ struct FeaturePair {
       on_second;
   double friction = 0, restitution = 0;
   double rolling = 0, torsional = 0;  ///< m
-  double reach = kNoBorder;           ///< of both shapes from the centres of their bodies, together
+  double reach = kInfinity;           ///< of both shapes from the centres of their bodies, together
 
   Touch touch(const Bodies& bodies) const {
     return std::visit(
@@ -118,7 +119,7 @@ struct FeaturePair {
   /// A vertex touches a face whose normal no edge of it goes against. (That of a box which stands
   /// flush on another one is on the border of the other's side faces, too: its edges go into them.)
   double out_of_face(const Vector3d& normal, const Frame<double>& A) const {
-    double least = kNoBorder;
+    double least = kInfinity;
     for (const Vector3d& way : edges)
       least = std::min(least, kFlush * way.norm() + normal.dot(A.R * way));
     return least;

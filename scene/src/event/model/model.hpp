@@ -6,6 +6,8 @@
 #include <limits>
 #include <string>
 
+#include "bounds.hpp"
+
 namespace tether::scene::event {
 
 using Eigen::MatrixXd;
@@ -63,7 +65,7 @@ class Model {
 
   virtual void set(double t, const double* q, const double* u) = 0;
   /// The first time after t at which forces have a kink or jump; infinite: there is none.
-  virtual double next_kink(double /*t*/) const { return std::numeric_limits<double>::infinity(); }
+  virtual double next_kink(double /*t*/) const { return kInfinity; }
   /// Motion begins anew at t: forces that jump then have jumped.
   virtual void begin_anew(double /*t*/) {}
   /// A smooth phase begins at the state that is set: tangents turn smoothly from here on.
@@ -93,7 +95,7 @@ class Model {
   virtual double passes(int /*contact*/) { return 0; }
 
   /// How far the contact is inside the border of its features, m; infinite: they have none.
-  virtual double margin(int /*contact*/) { return std::numeric_limits<double>::infinity(); }
+  virtual double margin(int /*contact*/) { return kInfinity; }
 
   /// Why the contact cannot be decided about at the state that is set; empty: it can.
   virtual std::string undecided(int /*contact*/) { return {}; }

@@ -12,7 +12,7 @@ namespace {
 
 /// More than these belong to stepping: every contact is looked at in every step.
 constexpr std::size_t kMostContacts = 16000;
-constexpr long kMostMoving = 100;
+constexpr std::size_t kMostMoving = 100;
 
 PlaneFeature plane_of(const Face& face) { return {face.at, face.normal, face.border}; }
 
@@ -137,8 +137,7 @@ std::set<std::pair<int, int>> jointed(const Scene& scene) {
 // contact of its own.
 
 std::vector<FeaturePair> potential_contacts(const Scene& scene) {
-  const long moving = std::count_if(scene.bodies.begin(), scene.bodies.end(),
-                                    [](const Body& body) { return !body.fixed; });
+  const std::size_t moving = scene.moving().size();
   if (moving > kMostMoving)
     throw std::invalid_argument(
         fmt::format("the event engine is for at most {} moving bodies, here are {}: use [stepping]",

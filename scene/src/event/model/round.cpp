@@ -1,6 +1,7 @@
 // Tether: contacts of ellipsoids and of the ends of cylinders. SPDX-License-Identifier:
 // BSD-3-Clause
 #include "round.hpp"
+#include "bounds.hpp"
 
 #include <Eigen/LU>
 
@@ -147,7 +148,7 @@ Jet<double> way(const Jet<double>& from, const Jet<double>& to) {
 /// How far inside of the contacts of its circle a disc's is: on its face's side, away from the
 /// other one. `n` points to the disc's partner.
 double margin_of_disc(const Frame<double>& f, const Round& disc, const Vector3d& n) {
-  if (!disc.is_disc()) return kNoBorder;
+  if (!disc.is_disc()) return kInfinity;
   const double size = disc.size();
   return std::min(size * (kFlush + n.dot(f.R * disc.outward)), Support(f, disc).reach(n));
 }
@@ -188,10 +189,10 @@ Touch RoundOnPlane::touch(const Frame<double>& A, const Frame<double>& B, const 
 }
 
 double RoundOnPlane::margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const {
-  if (plane.border.empty() && disc == 0) return kNoBorder;
+  if (plane.border.empty() && disc == 0) return kInfinity;
   const Vector3d n = times(B.R, plane.normal);
   const Vector3d centre = mechanics::point<0>(A, first.at).x - Support(A, first).at(n).point;
-  double least = kNoBorder;
+  double least = kInfinity;
   if (disc > 0) {
     const Vector3d d = point_in(B, centre) - plane.at;
     least = disc - (d - plane.normal.dot(d) * plane.normal).norm();
@@ -215,7 +216,7 @@ Touch RoundOnRound::touch(const Frame<double>& A, const Frame<double>& B, const 
 
 double RoundOnRound::margin(const Frame<double>& A, const Frame<double>& B,
                             const Vector3d& centre) const {
-  if (!first.is_disc() && !second.is_disc()) return kNoBorder;
+  if (!first.is_disc() && !second.is_disc()) return kInfinity;
   const Vector3d n = touch(A, B, centre, 0).normal;
   return std::min(margin_of_disc(A, first, -n), margin_of_disc(B, second, n));
 }

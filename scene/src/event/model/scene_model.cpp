@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene_model.hpp"
 
+#include "bounds.hpp"
 #include "effects/list.hpp"
 #include "mechanics/frames.hpp"
 
@@ -166,7 +167,7 @@ void SceneModel::set(double t, const double* q, const double* u) {
 
 double SceneModel::next_kink(double t) const {
   const auto next = std::upper_bound(kinks_.begin(), kinks_.end(), t);
-  return next != kinks_.end() ? *next : std::numeric_limits<double>::infinity();
+  return next != kinks_.end() ? *next : kInfinity;
 }
 
 void SceneModel::settle() {
@@ -416,8 +417,8 @@ void SceneModel::energy_gradient(double* by_q, double* by_u) const {
 }
 
 bool SceneModel::does_work() const {
-  return rows_.has_motion() || std::any_of(forces_.begin(), forces_.end(),
-                                           [](const auto& force) { return force->has_power(); });
+  return rows_.has_motion() ||
+         any_of(forces_, [](const auto& force) { return force->has_power(); });
 }
 
 double SceneModel::power() const {

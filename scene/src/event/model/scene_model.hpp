@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "bounds.hpp"
 #include "features.hpp"
 #include "joints/joint_laws.hpp"
 #include "joints/joint_rows.hpp"
@@ -97,7 +98,7 @@ class SceneModel final : public Model {
     return is_pair(contact) ? pair(contact).passes(bodies_.all()) : 0;
   }
   double margin(int contact) override {
-    return is_pair(contact) ? pair(contact).margin(bodies_.all()) : kNoBorder;
+    return is_pair(contact) ? pair(contact).margin(bodies_.all()) : kInfinity;
   }
 
   std::string undecided(int contact) override;

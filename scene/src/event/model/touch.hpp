@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bounds.hpp"
 #include "geometry/outline.hpp"
 #include "mechanics/bodies.hpp"
 #include "mechanics/frames.hpp"
@@ -13,9 +14,8 @@ namespace tether::scene::event {
 
 using namespace mechanics;
 
-constexpr double kNoBorder = std::numeric_limits<double>::infinity();
 /// The gap of features that do not face each other.
-constexpr double kNowhere = -std::numeric_limits<double>::infinity();
+constexpr double kNowhere = -kInfinity;
 
 /// Sine by which features that lie flush in a face may be turned beyond it by rounding.
 constexpr double kFlush = 0.1;
@@ -48,7 +48,7 @@ struct PlaneFeature {
     return t;
   }
   double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
-    double least = kNoBorder;
+    double least = kInfinity;
     if (border.empty()) return least;
     const Vector3d local = point_in(B, mechanics::point<0>(A, centre).x);
     for (const auto& [outward, limit] : border) least = std::min(least, limit - outward.dot(local));

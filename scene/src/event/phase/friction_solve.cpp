@@ -1,6 +1,7 @@
 // Tether: impacts and modes of contacts as problems of the contact library, through the joints.
 // SPDX-License-Identifier: BSD-3-Clause
 #include "friction_solve.hpp"
+#include "bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -90,7 +91,7 @@ class ProductSolver {
     out.w = -problem.b;
     out.regimes.assign(problem.parts.size(), Regime::separating);
     if (!problem.A.allFinite() || !problem.b.allFinite()) {  // the motion has left the numbers
-      out.error = std::numeric_limits<double>::infinity();
+      out.error = kInfinity;
       return out;
     }
     const Product product(problem);

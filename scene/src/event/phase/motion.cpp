@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "motion.hpp"
 
+#include "bounds.hpp"
 #include "friction_solve.hpp"
+#include "lists.hpp"
 #include "row_islands.hpp"
 
 namespace tether::scene::event {
@@ -137,7 +139,7 @@ bool Motion::passes_border(double t, const VectorXd& y, int contact) {
   if (margin > kBesideBorder * band) return false;
   const double inward = margin_rate(t, y, contact), least = bands_.approach(contact);
   if (inward < -least) return true;
-  return inward <= least && std::any_of(closed_.begin(), closed_.end(), [&](int other) {
+  return inward <= least && any_of(closed_, [&](int other) {
            return model_.are_at_one_edge(contact, other, kBesideBorder * band);
          });
 }
@@ -187,7 +189,7 @@ void Motion::gather() {
     C_.leftCols(joints_) = joint_W_.topRows(joints_).transpose();
     r_.head(joints_) = joint_rest_.head(joints_);
   }
-  smallest_slip_ = std::numeric_limits<double>::infinity();
+  smallest_slip_ = kInfinity;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k];
     ContactKinematics& kinematics = kinematics_[k];

@@ -1,6 +1,7 @@
 // Tether: the functions of the state whose zeros are events. SPDX-License-Identifier: BSD-3-Clause
 #include "watch.hpp"
 
+#include "bounds.hpp"
 #include "event/model/touch.hpp"
 #include "friction_solve.hpp"
 
@@ -156,8 +157,7 @@ double Watcher::support() {
   if (motion_.forces_are_lawful()) return support_band_ > 0 ? support_band_ : kNoise;
   ContactRows rows(motion_.model(), motion_.closed());
   const std::vector<VectorXd> slides = motion_.slides();
-  const bool sliding = std::any_of(slides.begin(), slides.end(),
-                                   [](const VectorXd& each) { return each.size() > 0; });
+  const bool sliding = any_of(slides, [](const VectorXd& each) { return each.size() > 0; });
   const AccelerationSolution answer = solve_accelerations(rows, slides, bands().of_accelerations());
   if (!answer.contacts.solved) return -answer.scale;
   double largest = 0;
@@ -375,7 +375,7 @@ std::optional<Zero> Watcher::first_zero(Phase& phase) {
   wake(phase, at_end, by);
   evaluate(phase.start() + phase.step_end(), at_end, by);
   std::optional<Zero> first;
-  undecided_ = {0, std::numeric_limits<double>::infinity()};
+  undecided_ = {0, kInfinity};
   for (Function& f : functions_) {
     if (!f.far && f.value == kNowhere) {
       f.dormant = true;
@@ -399,8 +399,7 @@ std::optional<Zero> Watcher::first_zero(Phase& phase) {
     }
     if (!first || zero.time < first->time) first = std::move(zero);
   }
-  if (first && first->time < undecided_.time)
-    undecided_.tolerance = std::numeric_limits<double>::infinity();
+  if (first && first->time < undecided_.time) undecided_.tolerance = kInfinity;
   if (!first)
     for (Function& f : functions_) {
       if (f.far) continue;

@@ -10,12 +10,10 @@ class JointLawEffect : public Effect {
  public:
   void plan(const Scene& scene, EngineKind,
             std::vector<mechanics::PlannedEffect>& lines) const override {
-    const auto count = std::count_if(scene.joints.begin(), scene.joints.end(), has_);
+    const auto count = count_if(scene.joints, has_);
     if (count > 0) lines.push_back({title_, mechanics::counted(count, "joint")});
   }
-  bool has_joint_laws(const Scene& scene) const override {
-    return std::any_of(scene.joints.begin(), scene.joints.end(), has_);
-  }
+  bool has_joint_laws(const Scene& scene) const override { return any_of(scene.joints, has_); }
 
  protected:
   JointLawEffect(const char* title, bool (*has)(const Joint&)) : title_(title), has_(has) {}

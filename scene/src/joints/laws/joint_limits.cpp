@@ -12,8 +12,6 @@ using namespace mechanics;
 
 namespace {
 
-constexpr double kFullTurn = 2 * linalg::kPi;
-
 bool has_limits(const Joint& joint) { return joint.limits.has_value(); }
 
 class JointLimitEffect : public JointLawEffect {
@@ -34,14 +32,14 @@ class JointLimitEffect : public JointLawEffect {
                                                 : angle ? "rad"
                                                         : "m");
     if (list.size() != 2) return;
-    const double unit = degrees ? kFullTurn / 360 : 1;
+    const double unit = degrees ? linalg::kPi / 180 : 1;
     JointLimits& limits = joint.limits.emplace();
     limits.lower = unit * list[0];
     limits.upper = unit * list[1];
     limits.restitution = in.number("limit_restitution", 0, files::kPart, "");
     if (!(limits.lower <= 0 && limits.upper >= 0 && limits.lower < limits.upper))
       in.wrong(key, "must be [least, largest] with 0, where the joint starts, between them");
-    if (angle && !(limits.upper - limits.lower < kFullTurn))
+    if (angle && !(limits.upper - limits.lower < 2 * linalg::kPi))
       in.wrong(key, "must be less than a full turn apart");
   }
   void write_joint(const Joint& joint, bool angle, files::Writer& out) const override {

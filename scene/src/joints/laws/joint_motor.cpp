@@ -3,6 +3,7 @@
 // The force along the coordinate that makes its speed the wanted one, or the largest one towards
 // it. With gains it follows target + rate t by the law in joint_spring.cpp.
 
+#include "bounds.hpp"
 #include "joints/laws/joint_law_effect.hpp"
 
 namespace tether::scene::effects {
@@ -17,9 +18,7 @@ bool is_ideal(const Joint& joint) { return joint.motor && !joint.motor->has_gain
 class JointMotorEffect : public JointLawEffect {
  public:
   JointMotorEffect() : JointLawEffect("motors", has_motor) {}
-  bool has_joint_laws(const Scene& scene) const override {
-    return std::any_of(scene.joints.begin(), scene.joints.end(), is_ideal);
-  }
+  bool has_joint_laws(const Scene& scene) const override { return any_of(scene.joints, is_ideal); }
   void read_joint(files::Fields& in, files::Reader& r, bool angle, Joint& joint) const override {
     const files::Value* table = in.table("motor");
     if (table == nullptr) return;
@@ -31,8 +30,7 @@ class JointMotorEffect : public JointLawEffect {
     read_gains(motor, angle, m.stiffness, m.damping);
     if (!m.has_gains() && !motor.has(bound))
       motor.missing(bound, fmt::format("the largest one, {}; not needed with gains", unit));
-    m.bound = motor.number(bound, m.has_gains() ? std::numeric_limits<double>::infinity() : 0,
-                           files::kNotNegative, unit);
+    m.bound = motor.number(bound, m.has_gains() ? kInfinity : 0, files::kNotNegative, unit);
     for (const char* key : {"target", "target_deg", "target_rad"})
       if (!(m.stiffness > 0) && motor.has(key)) motor.wrong(key, "is of a stiffness above 0");
     m.target = angle ? motor.angle("target_", 0) : motor.number("target", 0, files::kAny, "m");

@@ -15,6 +15,7 @@
 // and the speed of their end (contact::JointLaws), which is stable for all gains.
 #include <tether/linalg/pi.hpp>
 
+#include "bounds.hpp"
 #include "joints/coordinate.hpp"
 #include "joints/joint_laws.hpp"
 #include "joints/laws/joint_law_effect.hpp"
@@ -29,7 +30,7 @@ namespace {
 /// A spring, or a motor with gains.
 struct Gains {
   double stiffness, damping, rest;
-  double rate = 0, bound = std::numeric_limits<double>::infinity();
+  double rate = 0, bound = kInfinity;
   double offset = 0;    // of the stretch
   bool drives = false;  // its force has no potential
 
@@ -179,19 +180,12 @@ class JointSprings : public PairForces<Sprung> {
 
 constexpr std::size_t kMostRows = 100;
 
-// Rows of numbers above 0 that grow, and forces that do not fall.
-bool is_table(const files::Value& value, Table& table) {
-  using Kind = files::Value::Kind;
-  if (value.kind() != Kind::array || value.items().size() > kMostRows) return false;
+// Rows of numbers above 0 that grow, and forces that do not fall, the last above 0.
+bool is_table(const Table& table) {
   std::array<double, 2> last{0, 0};
-  for (const files::Value& row : value.items()) {
-    if (row.kind() != Kind::array || row.items().size() != 2) return false;
-    const files::Value &s = row.items()[0], &force = row.items()[1];
-    if (s.kind() != Kind::number || force.kind() != Kind::number) return false;
-    const std::array<double, 2> next{s.number(), force.number()};
-    if (!files::kAny.holds(next[0]) || !files::kAny.holds(next[1])) return false;
-    if (!(next[0] > last[0] && next[1] >= last[1])) return false;
-    table.push_back(last = next);
+  for (const std::array<double, 2>& row : table) {
+    if (!(row[0] > last[0] && row[1] >= last[1])) return false;
+    last = row;
   }
   return last[1] > 0;
 }
@@ -201,9 +195,9 @@ void read_table(files::Fields& in, const char* gain, const Joint& joint, Table& 
   if (!in.has(key)) return;
   if (!joints::type(joint.kind).is_free()) return in.wrong(key, "is of hinges and sliders");
   if (in.has(gain)) return in.wrong(key, fmt::format("give {} or {}, not both", gain, key));
-  Table table;
-  if (is_table(*in.find(key), table))
-    out = table;
+  Table table = in.pairs(key, kMostRows);
+  if (is_table(table))
+    out = std::move(table);
   else
     in.wrong(key, fmt::format("must be an array of up to {} [number above 0, force], numbers that "
                               "grow, forces that do not fall, the last above 0",
@@ -237,13 +231,9 @@ class JointSpringEffect : public JointLawEffect {
     const JointSpring& s = *joint.spring;
     std::string text;
     const auto add = [&](const char* key, double gain, const Table& table) {
-      std::string rows;
-      for (const std::array<double, 2>& row : table)
-        rows += fmt::format("{}[{}, {}]", rows.empty() ? "" : ", ", files::toml(row[0]),
-                            files::toml(row[1]));
       text += text.empty() ? "{ " : ", ";
       text += table.empty() ? fmt::format("{} = {}", key, files::toml(gain))
-                            : fmt::format("{}_table = [{}]", key, rows);
+                            : fmt::format("{}_table = {}", key, files::toml(table));
     };
     add("stiffness", s.stiffness, s.stiffness_table);
     add("damping", s.damping, s.damping_table);

@@ -74,15 +74,12 @@ void check_files(const Scene& scene, const CostArguments& arguments) {
   Output files;
   files["csv"] = arguments.csv;
   files["svg"] = arguments.svg;
-  std::vector<std::string> others = inputs_of(scene);
-  formats::check_names(files, others);
-  others.insert(others.end(), {arguments.csv, arguments.svg});
-  if (!arguments.html.empty()) check_page_name(arguments.html, others);
-  for (const std::string& file : {arguments.csv, arguments.svg, arguments.html})
-    if (!file.empty()) {
-      if (!arguments.force) check_replaceable(file);
-      check_writable(file);
-    }
+  files["html"] = arguments.html;
+  formats::check_names(files, inputs_of(scene));
+  for (const std::string& file : formats::names(files)) {
+    if (!arguments.force) check_replaceable(file);
+    check_writable(file);
+  }
 }
 
 int run_cost(const CostArguments& arguments) {
@@ -162,7 +159,7 @@ void add_cost_command(CLI::App& app, int* status) {
       ->check(positive_number());
   command->add_option("--csv", a->csv, "Write the table");
   command->add_option("--html", a->html,
-                      "Page of error against time whose points tell the command that repeats them");
+                      "Page of error against time, with the command that repeats each setting");
   command->add_option("--svg", a->svg, "Picture of error against time");
   command->add_flag("--force", a->force, "Replace files that Tether did not write");
   command->footer(

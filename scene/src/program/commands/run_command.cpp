@@ -5,9 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <progress.hpp>
-#include <tether/scene/player.hpp>
 
-#include "output/names.hpp"
 #include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/process/signals.hpp"
@@ -21,7 +19,7 @@ namespace tether::scene {
 namespace {
 
 struct RunArguments {
-  std::string file, restart, folder, html;
+  std::string file, restart, folder;
   std::optional<std::string> otherwise;
   std::map<const formats::Format*, std::string> files;  // as named by options
   std::optional<double> end, every;
@@ -80,10 +78,9 @@ void overlay(const RunArguments& arguments, Scene& scene) {
 }
 
 /// Leaves a process only its share of a film: the first of several processes writes all else.
-void write_film_alone(Output& o, std::string& html) {
+void write_film_alone(Output& o) {
   for (const formats::Format* each : formats::all())
     if (!each->film) o[each->name].clear();
-  html.clear();
 }
 
 /// `shared`: a line behind the summary, or nothing.
@@ -110,15 +107,9 @@ int run_scene(const RunArguments& arguments, Ranks* ranks) {
     throw std::invalid_argument("several processes have no standard input: give the scene's file");
   Scene scene = read_scene_argument(arguments.file);
   overlay(arguments, scene);
-  std::string html = arguments.html;
-  if (!first) write_film_alone(scene.output, html);
-  if (!html.empty() && html != "-" && !arguments.folder.empty())
-    html = (std::filesystem::path(arguments.folder) / html).string();
+  if (!first) write_film_alone(scene.output);
   catch_signals();
-  StandardOutputFile standard_output(scene.output, html);
-  std::optional<Player> player;
-  if (!html.empty() && !arguments.force) check_replaceable(html);
-  if (!html.empty()) player.emplace(scene, html);
+  StandardOutputFile standard_output(scene.output);
   tether::Progress bar(1);
   RunOptions options;
   options.restart = arguments.restart;
@@ -136,14 +127,7 @@ int run_scene(const RunArguments& arguments, Ranks* ranks) {
   }
   if (first) bar.start(scene.name, scene.end, 1);
   if (!arguments.quiet && first) options.progress = [&](double t) { bar.at(t); };
-  if (player) options.record = [&](const Engine& engine) { player->record(engine); };
-  RunResult result = run(scene, options);
-  if (player) {
-    player->write();
-    result.written.push_back(html);
-    if (!arguments.restart.empty())
-      result.remarks.push_back(html + " shows the motion from the restart on");
-  }
+  const RunResult result = run(scene, options);
   int code = result.interrupted ? kSignal + signal : exit_code(result);
   if (arguments.strict && !result.warnings.empty() && code == kGood) code = kNotMet;
   if (!first) return code;
@@ -187,7 +171,6 @@ void add_run_command(CLI::App& app, int* status) {
     command->add_option_function<std::string>(
         std::string("--") + each->name,
         [a = a.get(), each](const std::string& file) { a->files[each] = file; }, each->help);
-  command->add_option("--html", a->html, "Page that plays the run in a browser, on its own");
   command->add_option("--every", a->every, "Time between records, s")->check(positive_number());
   command->add_option("--end", a->end, "End of the run, s")->check(positive_number());
   command

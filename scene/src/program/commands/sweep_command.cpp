@@ -8,6 +8,8 @@
 #include <tether/scene/words.hpp>
 #include <thread>
 
+#include "bounds.hpp"
+#include "lists.hpp"
 #include "output/files.hpp"
 #include "output/names.hpp"
 #include "program/arguments.hpp"
@@ -22,8 +24,6 @@ namespace tether::scene {
 
 namespace {
 
-constexpr std::size_t kMostRuns = 100000;
-
 struct SweepArguments {
   std::string file, out = "-";
   std::vector<std::string> vary;
@@ -35,9 +35,9 @@ struct SweepArguments {
 std::vector<std::vector<Setting>> combinations(const std::vector<VariedNumber>& varied) {
   std::vector<std::vector<Setting>> all(1);
   for (const VariedNumber& each : varied) {
-    if (all.size() * each.values.size() > kMostRuns)
+    if (all.size() * each.values.size() > kMostListed)
       throw std::invalid_argument(
-          fmt::format("--vary: more than {} combinations of values", kMostRuns));
+          fmt::format("--vary: more than {} combinations of values", kMostListed));
     std::vector<std::vector<Setting>> longer;
     for (const std::vector<Setting>& before : all)
       for (const double value : each.values) {
@@ -74,8 +74,7 @@ const char* status_of(const RunResult& r) {
 std::string row_of(const Scene& scene, const RunResult& r) {
   const Summary& s = r.summary;
   const Counts& c = r.counts;
-  const auto met = std::count_if(r.judgements.begin(), r.judgements.end(),
-                                 [](const Judgement& j) { return j.judged && j.met; });
+  const auto met = count_if(r.judgements, [](const Judgement& j) { return j.judged && j.met; });
   std::string row = fmt::format(
       "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.3g}", status_of(r), met, scene.expect.size(),
       r.time, s.start_energy, s.end_energy, s.lowest_change, s.largest_change, s.drift,
@@ -112,11 +111,9 @@ bool begins(const std::string& row, const char* status) { return row.rfind(statu
 
 int exit_code(const std::vector<std::string>& rows) {
   const auto any = [&](const char* status) {
-    return std::any_of(rows.begin(), rows.end(),
-                       [&](const std::string& row) { return begins(row, status); });
+    return any_of(rows, [&](const std::string& row) { return begins(row, status); });
   };
-  if (std::all_of(rows.begin(), rows.end(), [](const auto& row) { return begins(row, "wrong"); }))
-    return kWrong;
+  if (all_of(rows, [](const auto& row) { return begins(row, "wrong"); })) return kWrong;
   if (any("wrong") || any("failed")) return kFailed;
   return any("not met") ? kNotMet : kGood;
 }
@@ -168,8 +165,7 @@ int sweep(const SweepArguments& arguments) {
   }
   output.write(table);
   const auto count = [&](const char* status) {
-    return std::count_if(rows.begin(), rows.end(),
-                         [&](const std::string& row) { return begins(row, status); });
+    return count_if(rows, [&](const std::string& row) { return begins(row, status); });
   };
   fmt::print("{} runs: {} ok, {} not met, {} failed, {} wrong{}\n", rows.size(), count("ok"),
              count("not met"), count("failed"), count("wrong"),

@@ -82,20 +82,17 @@ int flushed(int status) {
 
 namespace fs = std::filesystem;
 
-StandardOutputFile::StandardOutputFile(Output& output, std::string& html) {
-  std::vector<std::string*> files = {&html};
+StandardOutputFile::StandardOutputFile(Output& output) {
+  std::string* there = nullptr;
   for (const formats::Format* each : formats::all()) {
-    files.push_back(&output[each->name]);
-    if (each->film && *files.back() == "-")
+    std::string& file = output[each->name];
+    if (file != "-") continue;
+    if (each->film)
       throw std::invalid_argument(std::string(each->name) +
                                   " = \"-\": a film has many files and needs a name");
-  }
-  std::string* there = nullptr;
-  for (std::string* each : files) {
-    if (*each != "-") continue;
     if (there != nullptr)
       throw std::invalid_argument("only one output can be -, the standard output");
-    there = each;
+    there = &file;
   }
   if (there == nullptr) return;
   std::string folder = (fs::temp_directory_path() / "tether-XXXXXX").string();

@@ -47,9 +47,9 @@ int flushed(int status);
 /// whole before its first byte leaves. Nothing without such an output.
 class StandardOutputFile {
  public:
-  /// Replaces "-" in `output` and the name of a page. std::invalid_argument where there are two, or
-  /// where it is a film, which has many files.
-  StandardOutputFile(Output& output, std::string& html);
+  /// Replaces "-" in `output`. std::invalid_argument where there are two, or where it is a film,
+  /// which has many files.
+  explicit StandardOutputFile(Output& output);
   ~StandardOutputFile();
   StandardOutputFile(const StandardOutputFile&) = delete;
   StandardOutputFile& operator=(const StandardOutputFile&) = delete;

@@ -40,8 +40,7 @@ SparseJointGradient::SparseJointGradient(const JointRows& rows, const MovingBodi
   std::vector<int> columns;
   starts_.push_back(0);
   for (std::vector<int>& of_row : slots) {
-    std::sort(of_row.begin(), of_row.end());
-    of_row.erase(std::unique(of_row.begin(), of_row.end()), of_row.end());
+    sort_unique(of_row);
     for (const int slot : of_row)
       for (int j = 0; j < 6; ++j) columns.push_back(6 * slot + j);
     starts_.push_back(static_cast<int>(columns.size()));

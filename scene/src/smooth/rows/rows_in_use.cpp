@@ -32,7 +32,6 @@ constexpr double kSecondOrder = 1e-7;  // of n^T gamma, relative to |gamma|
 constexpr int kMostTrials = 8;         // velocities
 constexpr double kRounding = 1e-11;    // of g, with room for the next steps
 constexpr double kWeakest = 1e-3, kGood = 0.3;
-constexpr double kMuchWorse = 0.1;
 constexpr int kWait = 4;  // steps between choices while all pivots are good
 // Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
 // every state; those of closed loops are chosen by their entries.

@@ -26,7 +26,6 @@ constexpr double kWay = 1e-3;                   // of the free move, of a link's
 constexpr int kCloseMoves = 3;
 constexpr double kClosed = 1e-12;  // of a link's length
 constexpr double kStandsOut = 0.1, kGoodChoice = 0.03;
-constexpr double kMuchWorseChoice = 0.1;
 constexpr int kStepsBetweenSearches = 16;
 constexpr double kUsual = 0.3, kUnusual = 0.1;  // of the best weakest pivot so far
 // Velocities that look for thin rows at once, how often what rows forbid is taken from each, and
@@ -182,8 +181,7 @@ bool SparseRowChoice::choose(double weak) {
   weak = std::min(weak, kUnusual * usual_);
   RowSet carried = carriers_;
   carried.weakest = carriers_.weakest = seen.count < seen_ ? 0 : seen.weakest;
-  const bool as_it_was =
-      carried.weakest > kMuchWorseChoice * weakest_found_ && --steps_to_search_ > 0;
+  const bool as_it_was = carried.weakest > kMuchWorse * weakest_found_ && --steps_to_search_ > 0;
   if (carried.weakest > good() || (as_it_was && carried.weakest > weak)) {
     kept_ = std::move(carried);
     return false;
@@ -191,7 +189,7 @@ bool SparseRowChoice::choose(double weak) {
   steps_to_search_ = kStepsBetweenSearches;
   kept_ = best(carriers_.count, weak);
   weakest_found_ = kept_.weakest;
-  if (kept_.count != carriers_.count || carried.weakest > kMuchWorseChoice * kept_.weakest) {
+  if (kept_.count != carriers_.count || carried.weakest > kMuchWorse * kept_.weakest) {
     weakest_found_ = carried.weakest;
     if (carried.weakest > weak) kept_ = std::move(carried);
     return false;

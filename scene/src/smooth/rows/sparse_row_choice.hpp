@@ -5,6 +5,9 @@
 
 namespace tether::scene::smooth {
 
+/// Rows whose weakest pivot is less than this part of another set's are much worse.
+constexpr double kMuchWorse = 0.1;
+
 /// A set of rows, one entry each, and how far its rows are from depending on each other: the least
 /// that those before it leave of one, in the metric of M; 1 without rows, 0 where some do.
 struct RowSet {

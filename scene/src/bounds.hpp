@@ -1,0 +1,24 @@
+// Tether: bounds that several rooms share. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <limits>
+
+namespace tether::scene {
+
+/// Elements of a scene by repetition, knots of a load, points of a surface, runs of a sweep.
+constexpr std::size_t kMostListed = 100000;
+/// Bytes of a scene, and of a surface or an XML file.
+constexpr std::size_t kLargestScene = std::size_t{256} << 20, kLargestPart = std::size_t{64} << 20;
+/// Bytes of a wrong value that its message shows.
+constexpr std::size_t kLongestShown = 60;
+/// Things of one kind that are told one by one.
+constexpr std::size_t kTold = 5;
+/// Bodies that have columns in a table.
+constexpr std::size_t kMostInColumns = 200;
+/// Bodies beyond which pictures leave something out.
+constexpr std::size_t kManyBodies = 300;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace tether::scene
