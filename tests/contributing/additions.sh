@@ -88,6 +88,16 @@ compile xyz scene/src/record/xyz.cpp scene/src/record/formats.cpp
 touches 2 'output of runs'
 
 fresh
+like scene/src/plan/engines/stepping.cpp scene/src/plan/engines/glider.cpp 's/stepping_engine()/glider_engine()/; s/EngineKind::stepping/EngineKind::glider/'
+edit scene/src/plan/CMakeLists.txt 's,^  engines/event.cpp,  engines/glider.cpp\n&,'
+edit scene/include/tether/scene/scene.hpp 's/smooth, stepping, event }/smooth, stepping, event, glider }/'
+edit scene/include/tether/scene/words.hpp 's/EngineKind>, 4>/EngineKind>, 5>/
+  s/^      {"event", EngineKind::event},/&\n      {"glider", EngineKind::glider},/'
+make_list scene/src/plan
+compile glider scene/src/plan/engines/glider.cpp scene/src/plan/engine_type.cpp
+touches 4 'engine of scenes'
+
+fresh
 like contact/src/law/frictionless.hpp contact/src/law/glue.hpp 's/frictionless/glue/g; s/Frictionless/Glue/g'
 like contact/src/law/frictionless.cpp contact/src/law/glue.cpp 's/frictionless/glue/g; s/Frictionless/Glue/g'
 edit contact/src/law/laws.cpp 's,^#include "law/frictionless.hpp"$,&\n#include "law/glue.hpp",; s/Coulomb, Frictionless>/Coulomb, Frictionless, Glue>/'

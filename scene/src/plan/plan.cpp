@@ -6,6 +6,7 @@
 
 #include "effects/list.hpp"
 #include "effects/numbers.hpp"
+#include "engine_type.hpp"
 #include "joints/joint_type.hpp"
 #include "smooth/rows/moving_bodies.hpp"
 
@@ -13,25 +14,6 @@ namespace tether::scene {
 
 bool goes_on_in_steps(const Scene& scene) {
   return scene.event.value_or(EventOptions{}).otherwise == Otherwise::stepping;
-}
-
-std::unique_ptr<Engine> make_engine(const Scene& scene, const Plan& plan) {
-  switch (plan.engine) {
-    case EngineKind::smooth:
-      return make_smooth_engine(scene);
-    case EngineKind::stepping:
-      return make_stepping_engine(scene);
-    case EngineKind::event:
-      return goes_on_in_steps(scene) ? make_event_engine_with_steps(scene)
-                                     : make_event_engine(scene);
-    case EngineKind::automatic:
-      break;
-  }
-  throw std::invalid_argument("the plan names no engine");
-}
-
-std::unique_ptr<Engine> make_engine(const Scene& scene) {
-  return make_engine(scene, make_plan(scene));
 }
 
 namespace {
@@ -64,20 +46,6 @@ long contact_pairs(const Scene& scene) {
   return sum;
 }
 
-// Unknowns of IDA: position, quaternion and velocities of each body, the work of forces if energy
-// is kept in spite of them, and multipliers as the formulation has them.
-int smooth_unknowns(const Scene& s, const Plan& plan) {
-  const bool keeps_energy = std::any_of(
-      s.invariants.begin(), s.invariants.end(),
-      [](const Invariant& each) { return each.project && each.kind == InvariantKind::energy; });
-  const auto& all = effects::all();
-  const bool works = std::any_of(all.begin(), all.end(),
-                                 [&](const effects::Effect* each) { return each->does_work(s); });
-  const Formulation form = s.smooth.value_or(SmoothOptions{}).formulation;
-  const int multipliers = form == Formulation::index0 ? 0 : form == Formulation::index1 ? 1 : 2;
-  return 13 * plan.moving + (keeps_energy && works ? 1 : 0) + multipliers * plan.rows;
-}
-
 // Which of the smooth engine's matrices have entries only where they are not zero.
 std::string smooth_matrices(const Plan& plan) {
 #ifdef TETHER_SCENE_KLU
@@ -94,6 +62,7 @@ std::string smooth_matrices(const Plan& plan) {
 // The engines that a scene asks for, and what it has that not all of them move.
 struct Asked {
   bool smooth, event, then_steps, stepping, contact, laws, projected;
+  bool other;  // one that has no table of options
 
   explicit Asked(const Scene& s)
       : smooth(s.engine == EngineKind::smooth || s.smooth),
@@ -102,8 +71,8 @@ struct Asked {
         stepping(s.engine == EngineKind::stepping || (s.stepping && !then_steps)),
         contact(!s.pairs.empty()),
         laws(effects::has_joint_laws(s)),
-        projected(std::any_of(s.invariants.begin(), s.invariants.end(),
-                              [](const Invariant& each) { return each.project; })) {}
+        projected(any_of(s.invariants, [](const Invariant& each) { return each.project; })),
+        other(!smooth && !event && !stepping && s.engine != EngineKind::automatic) {}
   bool takes_steps() const { return !event && (stepping || contact || laws); }
 };
 
@@ -175,6 +144,10 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
                                                         : std::string(kNothingTouches);
   const Refusals refusals(s, asked, no_event);
   if (!refusals.text().empty()) throw std::invalid_argument(refusals.text());
+  if (asked.other) {
+    why = "the scene asks for it";
+    return s.engine;
+  }
   if (asked.then_steps && !no_event.empty()) {
     why = "[event] otherwise: " + no_event;
     return EngineKind::stepping;
@@ -246,9 +219,7 @@ Plan make_plan(const Scene& scene) {
   plan.rows += static_cast<int>(scene.couplings.size());
   for (const Invariant& each : scene.invariants)
     if (each.project) plan.invariants += each.kind == InvariantKind::energy ? 1 : 3;
-  plan.unknowns = plan.engine == EngineKind::stepping ? 6 * plan.moving
-                  : plan.engine == EngineKind::event  ? 13 * plan.moving + 1
-                                                      : smooth_unknowns(scene, plan);
+  plan.unknowns = engine_type(plan.engine).unknowns(scene, plan);
   plan.pairs = contact_pairs(scene);
   return plan;
 }

@@ -12,6 +12,7 @@
 #include "output/binary.hpp"
 #include "output/files.hpp"
 #include "output/names.hpp"
+#include "plan/engine_type.hpp"
 
 namespace tether::scene {
 
@@ -72,20 +73,7 @@ std::uint64_t hash_of_motion(const Scene& scene, const Plan& plan) {
   moving.output = Output{};
   moving.expect.clear();
   moving.engine = EngineKind::automatic;
-  if (plan.engine == EngineKind::event) {
-    if (!moving.event) moving.event.emplace();
-    moving.event->max_steps = EventOptions{}.max_steps;
-    moving.event->max_events = EventOptions{}.max_events;
-    moving.event->otherwise = Otherwise::stop;
-    if (moving.stepping) moving.stepping->threads = 1;
-  } else if (plan.engine == EngineKind::smooth) {
-    if (!moving.smooth) moving.smooth.emplace();
-    moving.smooth->max_steps = SmoothOptions{}.max_steps;
-  } else {
-    if (!moving.stepping) moving.stepping.emplace();
-    moving.stepping->threads = 1;
-    moving.stepping->on_failure = OnFailure::stop;
-  }
+  engine_type(plan.engine).spell_out(moving, true);
   return binary::hash_of(write_scene(moving));
 }
 

@@ -3,6 +3,7 @@
 
 #include <tether/scene/plan.hpp>
 
+#include "plan/engine_type.hpp"
 #include "program/arguments.hpp"
 #include "program/commands.hpp"
 #include "program/report_run.hpp"
@@ -16,27 +17,21 @@ struct CheckArguments {
   bool print = false;
 };
 
-/// The options that the run will have, spelt out.
-Scene with_options(Scene scene, EngineKind engine) {
-  if (engine == EngineKind::smooth && !scene.smooth) scene.smooth.emplace();
-  if (engine == EngineKind::stepping && !scene.stepping) scene.stepping.emplace();
-  if (engine == EngineKind::event && !scene.event) scene.event.emplace();
-  return scene;
-}
-
 int check(const CheckArguments& arguments) {
   int status = kGood;
   for (const std::string& file : arguments.files) {
     try {
-      const Scene scene = read_scene_argument(file);
+      Scene scene = read_scene_argument(file);
       const Plan plan = make_plan(scene);
       if (!arguments.print) print_start(scene);
       make_engine(scene, plan);  // which refuses what a run would
-      if (arguments.print)
-        fmt::print("{}", write_scene(with_options(scene, plan.engine)));
-      else
-        fmt::print("{}: right (bodies: {}, effects: {}, expectations: {})\n", on_terminal(file),
-                   plan.bodies, plan.effects.size(), scene.expect.size());
+      if (arguments.print) {
+        engine_type(plan.engine).spell_out(scene, false);
+        fmt::print("{}", write_scene(scene));
+        continue;
+      }
+      fmt::print("{}: right (bodies: {}, effects: {}, expectations: {})\n", on_terminal(file),
+                 plan.bodies, plan.effects.size(), scene.expect.size());
     } catch (const SceneError& e) {
       fmt::print(stderr, "{}\n", e.what());
       status = kWrong;
