@@ -11,8 +11,8 @@ namespace tether::contact::detail {
 
 namespace {
 
-// Entries of place_ for contacts that are not in a part, or not yet.
-constexpr int kOutside = -1, kReached = -2;
+// Entries of place_ for contacts that are not yet in a part, or in none.
+enum : int { reached_only = -2, outside };
 
 }  // namespace
 
@@ -42,14 +42,14 @@ bool LocalSolves::find_errors(Search& search, const Packed& x) {
 
 // The contacts that hang together with `seed` by reached ones, unless they are too many.
 void LocalSolves::add_part(const Problem& p, int seed, int largest) {
-  if (place_[at(seed)] != kReached) return;
+  if (place_[at(seed)] != reached_only) return;
   const std::size_t first = list_.size();
   list_.push_back(seed);
   place_[at(seed)] = 0;
   for (std::size_t k = first; k < list_.size(); ++k)
     for (int q = p.row_start()[at(list_[k])]; q < p.row_start()[at(list_[k] + 1)]; ++q) {
       const int j = p.columns()[at(q)];
-      if (place_[at(j)] != kReached) continue;
+      if (place_[at(j)] != reached_only) continue;
       place_[at(j)] = 0;
       list_.push_back(j);
     }
@@ -78,11 +78,11 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
     return false;
   }
   for (double cut : {0.3, 0.6, 0.9}) {
-    std::fill(place_.begin(), place_.end(), kOutside);
+    std::fill(place_.begin(), place_.end(), outside);
     std::vector<int> reached;
     for (int i = 0; i < n_; ++i)
       if (error_[at(i)] > cut * most_) reached.push_back(i);
-    for (int i : reached) place_[at(i)] = kReached;
+    for (int i : reached) place_[at(i)] = reached_only;
     std::size_t begin = 0;
     for (int layer = 0; layer < layers_; ++layer) {
       const std::size_t end = reached.size();
@@ -90,8 +90,8 @@ bool LocalSolves::find_parts(Search& search, const Packed& x) {
         for (int k = p.row_start()[at(reached[begin])]; k < p.row_start()[at(reached[begin] + 1)];
              ++k) {
           const int j = p.columns()[at(k)];
-          if (place_[at(j)] != kOutside) continue;
-          place_[at(j)] = kReached;
+          if (place_[at(j)] != outside) continue;
+          place_[at(j)] = reached_only;
           reached.push_back(j);
         }
     }
@@ -110,7 +110,7 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x)
   const Problem& p = system.problem();
   const int first = start_[at(part)], m = start_[at(part + 1)] - first;
   const int* contacts = list_.data() + first;
-  std::fill(place_.begin(), place_.end(), kOutside);
+  std::fill(place_.begin(), place_.end(), outside);
   for (int r = 0; r < m; ++r) place_[at(contacts[r])] = r;
   std::vector<MatrixBlock> blocks;
   Eigen::VectorXd b(3 * m), mu(m);

@@ -8,15 +8,15 @@
 namespace tether::contact::detail {
 namespace {
 
-bool isotropic(const Matrix3d& I) {
+bool is_isotropic(const Matrix3d& I) {
   return I(0, 1) == 0 && I(0, 2) == 0 && I(1, 2) == 0 && I(1, 0) == 0 && I(2, 0) == 0 &&
          I(2, 1) == 0 && I(0, 0) == I(1, 1) && I(0, 0) == I(2, 2);
 }
 
 // The closed form of spheres needs arms along the normal.
 bool arm_is_normal(int body, std::uint8_t traits, const Vector3d& r, const Vector3d& normal) {
-  if (body < 0 || !(traits & kIsotropic)) return body < 0;
-  if (traits & kNeverTurns) return true;  // no arm to speak of
+  if (body < 0 || !(traits & isotropic)) return body < 0;
+  if (traits & never_turns) return true;  // no arm to speak of
   const double s = normal.dot(r);
   return (r - s * normal).squaredNorm() <= 1e-28 * r.squaredNorm();
 }
@@ -25,16 +25,16 @@ bool arm_is_normal(int body, std::uint8_t traits, const Vector3d& r, const Vecto
 
 std::uint8_t body_traits(const RigidBody& b) {
   const bool still = b.inverse_inertia(0, 0) == 0 && b.angular_velocity.isZero(0);
-  return static_cast<std::uint8_t>((b.moves() ? kMoves : 0) +
-                                   (isotropic(b.inverse_inertia) ? kIsotropic : 0) +
-                                   (still ? kNeverTurns : 0));
+  return static_cast<std::uint8_t>((b.moves() ? can_move : 0) +
+                                   (is_isotropic(b.inverse_inertia) ? isotropic : 0) +
+                                   (still ? never_turns : 0));
 }
 
 MovingPair moving_pair(const PointContact& c, const std::vector<std::uint8_t>& traits,
                        bool friction) {
   const std::uint8_t one = traits[linalg::at(c.first)];
   const std::uint8_t other = c.second >= 0 ? traits[linalg::at(c.second)] : std::uint8_t{0};
-  const bool a = one & kMoves, b = other & kMoves;
+  const bool a = one & can_move, b = other & can_move;
   const Kind kind = !friction || c.mu == 0 ? Kind::smooth
                     : arm_is_normal(c.first, one, c.r1, c.normal) &&
                             arm_is_normal(c.second, other, c.r2, c.normal)
@@ -59,7 +59,7 @@ void GivenProblem::read_bodies() {
     const RigidBody& b = (*bodies_)[k];
     check(k, b);
     traits_[k] = body_traits(b);
-    if (!(traits_[k] & kMoves) && !(b.velocity.isZero(0) && b.angular_velocity.isZero(0))) {
+    if (!(traits_[k] & can_move) && !(b.velocity.isZero(0) && b.angular_velocity.isZero(0))) {
       fixed_slot_[k] = static_cast<int>(fixed_.size());
       fixed_.push_back({});
       store(b.velocity, fixed_.back().v);

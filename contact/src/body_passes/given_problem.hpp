@@ -12,7 +12,7 @@
 namespace tether::contact::detail {
 
 // Properties of a body that decide the kinds of its contacts: a sum of these.
-constexpr std::uint8_t kMoves = 1, kIsotropic = 2, kNeverTurns = 4;
+enum Trait : std::uint8_t { can_move = 1, isotropic = 2, never_turns = 4 };
 std::uint8_t body_traits(const RigidBody& body);
 
 // The bodies of a contact that move, the first one always, `second` is -1 if the other one does

@@ -5,6 +5,8 @@
 #include <tether/linalg/block_lu.hpp>
 #include <tether/linalg/index.hpp>
 
+#include "problem/body_form.hpp"
+
 namespace tether::contact::detail {
 namespace {
 
@@ -15,7 +17,6 @@ constexpr double kAssembly = 250;     // a block
 constexpr double kSteps = 10;         // factorisations from sticking to a solution, mostly
 constexpr double kMostSteps = 20;     // of a run of interior points
 constexpr double kLeastSweeps = 500;  // on the Problem, after which packings begin to end
-constexpr int kMany = 4;              // contacts a body, from which on equations are by bodies
 
 using linalg::at;
 
@@ -60,7 +61,7 @@ double AssemblyPrice::factorisation() {
     for (int body : {first_[at(contact(place))], second_[at(contact(place))]})
       if (body >= 0) of[at(local(body))].push_back(place);
   Pattern pattern;
-  const bool by_bodies = n >= kMany * bodies;
+  const bool by_bodies = n >= kContactsOfBody * bodies;
   if (by_bodies) {
     for (int body = 0; body < bodies; ++body) {
       pattern.columns.push_back(body);
@@ -78,8 +79,8 @@ double AssemblyPrice::factorisation() {
       pattern.close_row();
     }
   }
-  constexpr double kNodes = 2;  // a body has six rows: two blocks
-  const double operations = pattern.operations() * (by_bodies ? kNodes * kNodes * kNodes : 1);
+  // A body has six rows, two blocks: 2^3 products.
+  const double operations = pattern.operations() * (by_bodies ? 8 : 1);
   factorisation_ = 4 * operations + (by_bodies ? 800.0 * n : 32 * blocks_ + 240.0 * n);
   return factorisation_;
 }

@@ -6,6 +6,7 @@
 
 #include "cones/cone_rows.hpp"
 #include "cones/embedding.hpp"
+#include "problem/criterion.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -14,8 +15,6 @@ using linalg::at;
 
 namespace {
 
-// Residual of free rows after least squares, over the velocity that the problem needs.
-constexpr double kContradiction = 1e-7;
 // Solves with a tolerance that the residual of the rows asks for, where that of the contacts, whose
 // scale is theirs after elimination, was too loose.
 constexpr int kTries = 3;
@@ -55,7 +54,8 @@ void ConeSolver::Implementation::judge(const ConeProblem& problem,
   const double needed = detail::largest_need(problem);
   for (int row : embedding.free_rows().rows()) {
     const double scale = problem.row_scale()[at(row)], w = std::abs(out.velocities[row]);
-    if (scale > 0 ? w * scale > kContradiction * needed : w > 0) out.contradicting.push_back(row);
+    if (scale > 0 ? w * scale > detail::kContradiction * needed : w > 0)
+      out.contradicting.push_back(row);
   }
 }
 

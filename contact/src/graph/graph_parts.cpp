@@ -2,6 +2,7 @@
 #include "graph/graph_parts.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
@@ -14,7 +15,7 @@ using linalg::at;
 constexpr int kLeast = 64, kMost = 384;
 
 // Number of colours in the bit masks of chunks; chunks beyond get a colour of their own.
-constexpr int kMasked = 63;
+constexpr int kMasked = std::numeric_limits<std::int64_t>::digits;
 
 }  // namespace
 

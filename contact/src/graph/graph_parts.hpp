@@ -11,7 +11,7 @@ namespace tether::contact::detail {
 // How a contact is solved: alone, or in fours that have no moving body in common. A chunk holds its
 // contacts in this order.
 enum class Kind : std::uint8_t { general4, sphere4, general, sphere, smooth };
-constexpr int kKinds = 5;
+constexpr int kKinds = static_cast<int>(Kind::smooth) + 1;
 
 // Contacts that one thread sweeps in one go: place .. place of the next chunk. Bodies of a chunk
 // are near each other, so that they stay in the cache.

@@ -77,21 +77,22 @@ std::vector<MatrixEntry> read_blocks(Tokens& in, long rows, long columns) {
 
 /// Triplets or compressed columns as CSparse prints them.
 std::vector<MatrixEntry> read_sparse(Tokens& in, long rows, long columns) {
-  constexpr long kTriplets = 1, kColumns = 2;
-  const long origin = in.integer("sparse storage (1: triplets, 2: columns)", kTriplets, kColumns);
+  enum : long { triplets_first = 1, columns_first };
+  const long origin =
+      in.integer("sparse storage (1: triplets, 2: columns)", triplets_first, columns_first);
   if (in.line("the sparse matrix").rfind("CSparse", 0) != 0)
     in.fail("a line that begins with CSparse is expected in the sparse matrix");
   const std::string head = in.line("the sparse matrix");
   long m = -1, n = -1, most = -1, count = -1;
-  const char* form = origin == kTriplets ? "triplet: %9ld-by-%9ld, nzmax: %18ld nnz: %18ld"
-                                         : "%9ld-by-%9ld, nzmax: %18ld nnz: %18ld";
+  const char* form = origin == triplets_first ? "triplet: %9ld-by-%9ld, nzmax: %18ld nnz: %18ld"
+                                              : "%9ld-by-%9ld, nzmax: %18ld nnz: %18ld";
   if (std::sscanf(head.c_str(), form, &m, &n, &most, &count) != 4 || m != rows || n != columns ||
       count < 0)
     in.fail("the head of the sparse matrix does not match it");
-  claim(in, count, origin == kTriplets ? kTriplet : kColumn);
+  claim(in, count, origin == triplets_first ? kTriplet : kColumn);
   std::vector<MatrixEntry> out;
   const auto row = [&] { return static_cast<int>(in.integer("row", 0, rows - 1)); };
-  if (origin == kTriplets) {
+  if (origin == triplets_first) {
     for (long k = 0; k < count; ++k) {
       const int r = row(), c = static_cast<int>(in.integer("column", 0, columns - 1));
       in.expect(':', "the sparse matrix");

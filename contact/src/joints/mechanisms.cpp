@@ -9,15 +9,13 @@
 #include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/index.hpp>
 
-#include "problem/inverse_mass_root.hpp"
+#include "problem/body_form.hpp"
+#include "problem/criterion.hpp"
 
 namespace tether::contact::detail {
 
 namespace {
 
-// Rows contradict each other above this part of the largest speed in the rows of their mechanism:
-// above the rounding of dependent rows, below any intended motion.
-constexpr double kContradiction = 1e-7;
 // The squares of smaller speeds underflow, so that relative errors lose their meaning.
 constexpr double kLeastScale = 1e-150;
 

@@ -20,7 +20,6 @@ struct Coulomb {
   static constexpr const char* kName = "coulomb";
   static constexpr bool kFriction = true;
   static const LawKernels kKernels;
-  static constexpr int kMaxEvaluations = 80;
   static constexpr int kFastEvaluations = 8;
   static constexpr double kManyBranches = 0.8;
 

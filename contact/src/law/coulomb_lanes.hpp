@@ -41,7 +41,7 @@ struct CoulombLanes {
     v4 l = choose(both(less(lo, lambda), less(lambda, hi)), lambda, guess);
     const v4 stop = choose(less(beta_max, all(1e3) * beta_min), all(3e-8), all(1e-12));
     v4 active = wanted;
-    for (int n = 0; n < Coulomb::kMaxEvaluations; ++n) {
+    for (int n = 0; n < kMaxEvaluations; ++n) {
       const SlipEquation f = slip_equation(l, k, L.beta0, L.beta1, L.g0, L.g1, h0, h1, gh);
       const v4 above = less(zero, f.excess), rising = less(zero, k * f.slope);
       const v4 step = f.excess * f.q * f.z / or_one(rising, k * f.slope);

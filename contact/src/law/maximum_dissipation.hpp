@@ -31,7 +31,6 @@ struct MaximumDissipation {
   static constexpr const char* kName = "maximum_dissipation";
   static constexpr bool kFriction = true;
   static const LawKernels kKernels;
-  static constexpr int kMaxEvaluations = 80;
 
   static TETHER_INLINE Regime solve(const LocalBlock& L, double bn, double b0, double b1, double* x,
                                     double& /*lambda*/, int& evaluations) {

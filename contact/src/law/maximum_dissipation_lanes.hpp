@@ -26,7 +26,7 @@ struct MaximumDissipationLanes {
     v4 lo = a.lo, hi = a.hi, t = a.t;
     const v4 d1 = 2.0 * q2, d2 = 3.0 * q3, d3 = 4.0 * q4;
     v4 active = wanted;
-    for (int n = 0; n < MaximumDissipation::kMaxEvaluations; ++n) {
+    for (int n = 0; n < kMaxEvaluations; ++n) {
       const v4 f = (((q4 * t + q3) * t + q2) * t + q1) * t + q0;
       const v4 d = ((d3 * t + d2) * t + d1) * t + q1;
       const v4 below = less(f, zero);

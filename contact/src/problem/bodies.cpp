@@ -10,7 +10,6 @@
 #include <tether/linalg/index.hpp>
 
 #include "problem/body_form.hpp"
-#include "problem/inverse_mass_root.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {

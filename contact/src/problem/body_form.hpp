@@ -2,13 +2,28 @@
 // BSD-3-Clause
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <map>
 #include <memory>
+#include <tether/contact/bodies.hpp>
 #include <tether/linalg/block3.hpp>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 #include <vector>
 
 namespace tether::contact::detail {
+
+/// C with C C' = inverse mass.
+inline Matrix6d inverse_mass_root(const Matrix6d& inverse_mass) {
+  using Plain = Eigen::Matrix<double, 6, 6>;
+  const Eigen::LLT<Plain> cholesky((Plain(inverse_mass)));
+  if (cholesky.info() == Eigen::Success) return Plain(cholesky.matrixL());
+  const linalg::SymmetricEigen<6> eigen = linalg::symmetric_eigen(inverse_mass);
+  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+/// Contacts a body, from which on equations by bodies cost less whatever their fill.
+constexpr int kContactsOfBody = 4;
 
 /// A = H H' in blocks of three columns, the nodes. H = J C, C C' the inverse mass of each body:
 /// nodes 2 k and 2 k + 1 are the linear and angular velocity of body k, and a contact has those of

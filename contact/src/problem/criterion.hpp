@@ -17,6 +17,10 @@ constexpr double kSumUnits = 64;
 // the bodies' velocities.
 constexpr double kSpeedRoundOff = 32 * kRoundOff;
 
+// Rows contradict each other above this part of the largest speed in them, or of what their problem
+// needs: above the rounding of dependent rows, below any intended motion.
+constexpr double kContradiction = 1e-7;
+
 // The change of velocity that a contact needs on its own: its approach, and of its slip what
 // friction can take away, mu T/a times the approach. A slip that friction cannot stop says nothing
 // about how exact impulses have to be. bt: |b_t|, ratio: (T00 + T11) / 2a.

@@ -25,7 +25,9 @@ using linalg::at;
 namespace {
 
 constexpr int kPlaces = 20;  // parts are cut anew at every so many of them
-constexpr int kReport = 6, kOfContact = 5, kOfBody = 6, kOfState = 4;  // numbers that are gathered
+// Numbers that are gathered.
+constexpr int kReport = 6, kOfContact = 5;
+constexpr int kOfBody = Vector6d::SizeAtCompileTime, kOfState = Eigen::Vector4d::SizeAtCompileTime;
 
 // Bodies of a list to ranks first .. first + ranks - 1: in two parts with the work of their ranks,
 // and so on.

@@ -17,10 +17,6 @@ using linalg::at;
 
 namespace {
 
-// w dt of what joints hold: an explicit step is stable below 2, and its iterations for the joints
-// contract by (w dt)^2.
-constexpr double kResolved = 1;
-
 // Throws std::invalid_argument on options that rolling friction does not go with.
 void check_rolling(const SteppingOptions& options) {
   if (options.law != Law::coulomb)
@@ -194,7 +190,8 @@ SubStepEnd SubStepper::take() {
 
 bool SubStepper::resolves_joints() const {
   const double turn = joints->vibration().frequency * now.length;
-  return !(turn > kResolved) || !std::isfinite(turn);  // no step helps where it is no number
+  // w dt: an explicit step is stable below 2, and its iterations for joints contract by (w dt)^2.
+  return !(turn > 1) || !std::isfinite(turn);  // no step helps where it is no number
 }
 
 // Velocities near the largest number leave none to the next operation.

@@ -24,9 +24,8 @@ double NewtonMatrix::cost(const Search& search) const {
 
 bool NewtonMatrix::order_by_bodies(Search& search) {
   if (ordered_) return by_bodies_;
-  constexpr int kMany = 2;  // contacts for each node
   const BodyForm* given = search.system.problem().body_form();
-  if (given == nullptr || given->contacts() < kMany * given->nodes) return false;
+  if (given == nullptr || 2 * given->contacts() < kContactsOfBody * given->nodes) return false;
   bodies_.order(*given);
   if (!(bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * cost(search))) return false;
   search.counts.work += kOrderBodies * search.system.size();

@@ -12,6 +12,8 @@ namespace tether::contact::detail {
 
 using namespace linalg;  // blocks, cones, vector code: shared with the projection's side
 
+constexpr int kMaxEvaluations = 80;  // of the scalar equation of a sliding contact
+
 // Right-hand side in the diagonal frame. The boundary of the friction disc on the plane w_n = 0 is
 // the conic |y| + g.y = k with a focus at the origin (method, eq. 7).
 struct LocalRhs {

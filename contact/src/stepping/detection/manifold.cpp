@@ -15,8 +15,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kParallelLines = 0.05;  // sine: lines that touch along each other
-
 constexpr double kLow = 1e-6;  // above the lowest point
 
 // Clips a line or a face to another face, seen along n; cuts have the identities of the edge and of
@@ -66,7 +64,7 @@ void along_lines(const ConvexPair& pair, const Flat& s, const Flat& t) {
     const Vector3d q = t.point[0] + y * (t.point[1] - t.point[0]);
     pair.add(p, n.dot(p - q), feature);
   };
-  if (std::abs(cross) > kParallelLines * std::sqrt(uu * vv)) {
+  if (std::abs(cross) > kFlatAngle * std::sqrt(uu * vv)) {
     const double x = std::clamp(n.dot(w.cross(v)) / cross, 0.0, 1.0);
     const double y = std::clamp(n.dot(w.cross(u)) / cross, 0.0, 1.0);
     return add(x, y, 0x7f00);

@@ -46,6 +46,10 @@ const ShapeForm& form(ShapeKind kind) {
   return *forms[k];
 }
 
+void ShapeForm::flat(const ConvexShape& s, const Vector3d& m, double, Flat& out) const {
+  out.add(s.farthest(m), 0);
+}
+
 void check_points(const Shape& s, std::size_t least) {
   if (s.points.size() < least || s.points.size() > 65536)
     throw std::invalid_argument(std::string(name(s.kind)) +

@@ -6,6 +6,8 @@
 
 namespace tether::contact::detail {
 
+constexpr double kFlatAngle = 0.05;  // radian: faces and lines up to here lie against each other
+
 class ConvexShape;
 struct Flat;
 struct Polyhedron;
@@ -57,8 +59,9 @@ class ShapeForm {
                                double /*tolerance*/, Eigen::Vector3d& /*face*/) const {
     return Eigen::Vector3d::Zero();
   }
-  virtual void flat(const ConvexShape&, const Eigen::Vector3d& /*m*/, double /*height*/,
-                    Flat&) const {}
+  /// By default the farthest point alone: round shapes.
+  virtual void flat(const ConvexShape& shape, const Eigen::Vector3d& m, double height,
+                    Flat& out) const;
 
  private:
   Family family_;

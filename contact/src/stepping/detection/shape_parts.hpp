@@ -10,8 +10,7 @@
 
 namespace tether::contact::detail {
 
-constexpr double kFlatAngle = 0.05;  // radian: up to here a face or a line lies against a plane
-constexpr double kUpright = 1e-9;    // sine of a tilt without direction
+constexpr double kUpright = 1e-9;  // sine of a tilt without direction
 
 inline double signed_one(double x) { return x < 0 ? -1 : 1; }
 

@@ -8,6 +8,9 @@
 
 namespace tether::contact::detail {
 
+/// Contacts of an island whose impacts are taken one after the other, at most.
+constexpr int kFewContacts = 16;
+
 /// An impact: speed of approach before and with the forces of the step, > 0, m/s, and coefficient
 /// of restitution (0: too slow to bounce).
 struct Impact {

@@ -46,7 +46,7 @@ bool LaterImpacts::find_islands(const NearContacts& near, const Impacts& impacts
   // 1: an impact; 2: a later one, too.
   marked_.assign(bodies.motion.size(), 0);
   for (const Impact& i : impacts.list())
-    if (size_[root(at(i.contact))] <= kMostContacts) marked_[root(at(i.contact))] = 1;
+    if (size_[root(at(i.contact))] <= kFewContacts) marked_[root(at(i.contact))] = 1;
   if (laws_ != nullptr) islands_.mark(laws_->under_laws(), marked_, 0);
   any = false;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {

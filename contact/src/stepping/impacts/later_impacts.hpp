@@ -19,10 +19,10 @@ namespace tether::contact::detail {
 /// in passes; each pass has the contacts that touch or close with its velocities. If an impact does
 /// not bounce, the displacement up to it counts for the others; if it bounces, the velocities after
 /// it move the bodies for the whole step. Contacts that still close after kPasses get bias gap /
-/// dt. Islands of more than kMostContacts keep the one solve.
+/// dt. Islands of more than kFewContacts keep the one solve.
 class LaterImpacts {
  public:
-  static constexpr int kPasses = 16, kMostContacts = 16;
+  static constexpr int kPasses = kFewContacts;
   struct Counts {
     int problems = 0, sweeps = 0, bounces = 0;
   };

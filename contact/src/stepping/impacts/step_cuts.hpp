@@ -40,11 +40,11 @@ void add_impulses(const StepContacts& part, StepContacts& sum);
 class StepCuts {
  public:
   /// Most contacts of a scene, or, in scenes of up to the second number, of a striking island.
-  static constexpr std::size_t kMostContacts = 16, kMostInScene = 512;
+  static constexpr std::size_t kMostContacts = kFewContacts, kMostInScene = 512;
   static constexpr int kMost = 32;  // in a step; then as without
   /// Budget of cuts with more than kMostContacts, in contact problems: income of a step, most that
-  /// is kept, first stock, price of a cut.
-  static constexpr double kShare = 0.05, kMostKept = 16, kFirst = 3, kPrice = 3;
+  /// is kept, price of a cut, which is the first stock.
+  static constexpr double kShare = 0.05, kMostKept = 16, kPrice = 3;
 
   StepCuts(const BodyOptions& options, IslandMaker* maker);
   /// Islands of these bodies are not cut, nor are those with rolling friction: laws of joints, and
@@ -91,7 +91,7 @@ class StepCuts {
  private:
   void find_islands(const NearContacts& near, const BodySet& bodies, const StepContacts& contacts);
 
-  double when_ = 0, kept_ = kFirst;
+  double when_ = 0, kept_ = kPrice;
   const JointPart* laws_ = nullptr;
   MovingIslands islands_;
   std::vector<std::size_t> size_;                   // of islands, by their root: contacts

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stepping/detection/shape_form.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -42,8 +44,6 @@ void crossing_edges(const Placed& a, const Placed& b, const EdgeAxis& E, double 
 
 namespace {
 
-constexpr double kAcross = 0.05;  // radian: an edge farthest in a direction, as a whole
-
 // The edge of `a` that is farthest in direction m: from the farthest vertex along the edge that
 // lies most across m. A vertex alone (from == to) where none does.
 Polyhedron::Edge farthest(const Placed& a, const Vector3d& m, double rounding) {
@@ -51,7 +51,7 @@ Polyhedron::Edge farthest(const Placed& a, const Vector3d& m, double rounding) {
   for (int k = 1; k < static_cast<int>(a.now.vertices.size()); ++k)
     if (m.dot(a.vertex(k)) > m.dot(a.vertex(v)) + rounding) v = k;
   Polyhedron::Edge best{v, v, -1, -1};
-  double slope = kAcross;
+  double slope = kFlatAngle;
   for (const Polyhedron::Edge& e : a.shape->edges) {
     if (e.from != v && e.to != v) continue;
     const Vector3d u = a.vertex(e.to) - a.vertex(e.from);

@@ -14,8 +14,6 @@ using Eigen::Vector3d;
 
 namespace {
 
-// Faces more oblique to each other than this have an edge contact between them.
-constexpr double kParallel = 0.99875;  // cos 0.05
 // Part of the smaller thickness: separations between which faces are preferred.
 constexpr double kTie = 1e-4;
 
@@ -87,7 +85,9 @@ void PolyhedraContacts::polyhedra(double margin, NearPoints& out) {
     return;
   }
   const Vector3d &nA = a_.face(A.face).normal, &nB = b_.face(B.face).normal;
-  if (std::abs(A.separation - B.separation) < tie && -nA.dot(nB) < kParallel)
+  // Faces more oblique than kFlatAngle to each other have an edge contact between them.
+  if (std::abs(A.separation - B.separation) < tie &&
+      -nA.dot(nB) < 1 - 0.5 * kFlatAngle * kFlatAngle)
     return edge_along_edge(a_, b_, (nA - nB).normalized(), rounding, margin, out);
   over_face(A, B, tie, margin, size, -std::numeric_limits<double>::infinity(), out);
 }

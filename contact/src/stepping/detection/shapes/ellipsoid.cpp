@@ -100,9 +100,6 @@ class EllipsoidForm final : public ShapeForm {
     const Eigen::Matrix3d H = square.asDiagonal();
     return H / h - x * x.transpose() / (h * h * h);
   }
-  void flat(const ConvexShape& s, const Vector3d& m, double, Flat& out) const override {
-    out.add(s.farthest(m), 0);
-  }
 };
 
 }  // namespace

@@ -32,9 +32,6 @@ class SphereForm final : public ShapeForm {
     out.rotation.setIdentity();
     out.round = out.thickness = s.radius;
   }
-  void flat(const ConvexShape& s, const Vector3d& m, double, Flat& out) const override {
-    out.add(s.farthest(m), 0);
-  }
 };
 
 }  // namespace
