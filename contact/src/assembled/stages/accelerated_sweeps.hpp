@@ -3,7 +3,6 @@
 #pragma once
 
 #include "assembled/search/search.hpp"
-#include "assembled/stages/momentum.hpp"
 #include <tether/linalg/anderson.hpp>
 
 namespace tether::contact::detail {
@@ -27,7 +26,7 @@ class AcceleratedSweeps {
  private:
   static constexpr int kToggles = 4, kLeastQuiet = 3, kMostQuiet = 320, kWindow = 60, kRecent = 10,
                        kPersuaded = 40, kFew = 500, kCarriedQuiet = 120, kDepth = 10;
-  static constexpr double kToggledShare = 0.003;
+  static constexpr double kToggledShare = 0.003, kMomentumCost = 3;  // the latter ns a contact
 
   int toggles(const System& system);
   bool carried() const { return n_ > kFew; }
@@ -37,7 +36,6 @@ class AcceleratedSweeps {
 
   int n_ = 0;
   Anderson anderson_;
-  Momentum momentum_;
   std::vector<char> regime_;  // of each contact after the last sweep
   // f: weighted change of a sweep.
   bool accelerate_ = false, eager_ = false;
@@ -49,7 +47,8 @@ class AcceleratedSweeps {
     double f = 0;
   };
   Mark earlier_, later_;
-  Packed x_, g_, f_;
+  double grown_ = 1, last_f_ = 0;  // of the momentum, 1 at rest; of the sweep before
+  Packed x_, g_, f_, before_;      // before_: g of the sweep before
 };
 
 }  // namespace tether::contact::detail

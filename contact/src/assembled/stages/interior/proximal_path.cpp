@@ -8,9 +8,9 @@ namespace tether::contact::detail {
 
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
 // solution, x drifts at a constant rate until one of them changes (method, section 6).
-void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
-                                 ProximalNewton& newton, bool whole) {
-  constexpr int kCorrections = 4, kSteps = 20, kSweeps = 3;
+void InteriorPoint::run_proximal(Search& search, const PackedVector* x, ProximalNewton& newton,
+                                 bool whole) {
+  constexpr int kProblems = 60, kCorrections = 4, kSteps = 20, kSweeps = 3;
   constexpr double kFirst = 1e-2, kLeast = 1e-9, kMost = 1;  // tau, for ordinary loads
   constexpr double kLightest = 1e6, kNear = 1e-4;
   System& system = search.system;
@@ -23,7 +23,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
   const double least = kLeast / lighter;
   double tau = kFirst / lighter;
   bool drifting = false;
-  for (int outer = 0; outer < most; ++outer) {
+  for (int outer = 0; outer < kProblems; ++outer) {
     int corrections = 0;
     if (drifting) {
       for (int i = 0; i < n_; ++i)
