@@ -19,7 +19,7 @@ BUILT = "build/release/benchmarks"
 TETHER = "build/release/scene/tether"
 # SUNDIALS at -O3, which codes of one method are compared with: the distribution's is not optimised.
 OPTIMISED = pathlib.Path(os.environ.get("TETHER_SUNDIALS") or ROOT / "build" / "sundials")
-COMPARED = {"instructions", "accuracy_cost", "dae_set", "crossover", "stability", "chain_cost"}
+COMPARED = {"instructions", "accuracy_cost", "dae_set", "crossover", "stability", "chain_cost", "peers"}
 # Name: title, how to read it, command from the root of the project.
 COMMANDS = {
     "pendulum": ("The pendulum of Hanson and Krogh",
@@ -61,6 +61,11 @@ COMMANDS = {
                f"python3 benchmarks/mechanisms/iftomm.py {TETHER}"),
     "clearance": ("A slider-crank with clearance", "Work and error of the largest of three angles, rad, at the end.",
                   f"python3 benchmarks/clearance/clearance.py {TETHER}"),
+    "peers": ("Joints, friction and impacts beside Bullet, ODE, MuJoCo and Simbody",
+              "Error: the largest distance of points of the bodies from the reference at ten equal times, m; sizes are near 1 m. "
+              "References: `benchmarks/peers/references.py`. Times: processor time of the motion alone in ms, best of 3, at the "
+              "errors that head the columns; \"-\": not within the limit of a run.",
+              "nice ninja -C build/release peers >&2 && python3 benchmarks/peers/peers.py build/release/benchmarks/peers"),
     "verify": ("Shipped scenes judged by an independent checker",
                "At most 0.3 s of each scene, every step, by `scene/tools/verify.py`, which shares no code with Tether. Judgements are those of "
                "contact forces, joints and balances of impulses.",
