@@ -220,12 +220,9 @@ void Automatic::interior_points(Search& search, bool by_bodies) {
   solve_parts_of_end(search);
 }
 
-// If the path of interior points ends near a solution, a few proximal problems reach it. The
-// first one that fails ends the attempt, except with heavy bodies on light ones: there x has far to
-// go.
+// From where interior points end proximal problems may reach a solution. The first one that fails
+// ends the attempt, except with heavy bodies on light ones: there x has far to go.
 void Automatic::proximal_path_at_best(Search& search) {
-  constexpr double kRough = 1e-2;
-  if (search.best_error > kRough) return;
   x_ = search.best;
   const bool loaded = search.system.load(x_.data()) > kOrdinaryLoad;
   interior_.run_proximal(search, x_.data(), newton_, loaded);

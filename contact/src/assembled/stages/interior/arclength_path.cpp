@@ -119,22 +119,19 @@ struct InteriorPoint::ArclengthPath {
 
   // Along the curve and back to it; false: it is lost.
   bool go_on() {
-    // A direction that could be followed for so long is taken, and is the last one where it could
-    // be for longer. The next one may not be much shorter.
+    // A direction that could be followed once is taken, and is the last one where it could be kLast
+    // times.
     constexpr double kFewer = 0.7, kMore = 1.7;
     constexpr int kMost = 6, kMany = 3;
     go_along(tangent);
-    double before = 0;
     for (int iteration = 1; !search.exhausted(); ++iteration) {
       const double longest = directions(true) ? reach() : 0;
       const bool near = longest >= kLast;
-      if (!near && (!(longest >= std::max(1.0, kFewer * before)) || iteration > kMost)) {
+      if (!near && (!(longest >= 1) || iteration > kMost)) {
         if (!go_back()) return false;
         iteration = 0;
-        before = 0;
         continue;
       }
-      before = longest;
       const double length = std::min(1.0, kInside * longest);
       pairs.move(newton, length, length * newton_log_nu);
       evaluate();
