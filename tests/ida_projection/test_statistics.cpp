@@ -173,6 +173,8 @@ TEST_CASE("the table begins with a verdict and leaves out what is zero") {
   std::size_t count = 0;
   for (; std::getline(lines, line); ++count) CHECK(contains(line, " = "));
   CHECK(count == 4);
+  s.untested = 3;
+  CHECK(contains(s.table(), "error test are 3 algebraic variables, whose values between steps"));
   s.not_finite = 2;
   CHECK(contains(s.table(), "failed and were repeated: 2."));
   s.mean_move = 3;

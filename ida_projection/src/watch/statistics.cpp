@@ -84,6 +84,9 @@ std::string verdict(const Statistics& s) {
   else
     out << "The constraints hold: |g| is at most " << s.largest_drift_after
         << ", steps were moved by " << s.mean_move << " tolerances in the mean.";
+  if (s.untested > 0)
+    out << " Out of the error test are " << s.untested
+        << " algebraic variables, whose values between steps have no tolerance.";
   if (s.failures() > 0) out << " Attempts that failed and were repeated: " << s.failures() << ".";
   return out.str();
 }
