@@ -54,6 +54,11 @@ COMMANDS = {
                            " | grep -E 'natural_map  |^tolerance|^unsolved'"),
     "contact_scale": ("A sweep over many contacts", "Nanoseconds of a contact and sweep by size and threads.",
                       f"{BUILT}/contact/contact_scale --spheres 1 --threads 2 --most 100000"),
+    "islands": ("Large islands: residual against time",
+                "A cell is the residual by `evaluate` and the processor time in seconds; 1e-6 is wanted. \"Sweeps\" has no more than so "
+                "many; \"Solver\" has the assembled problem and that work at most. A heap has settled, then the weight of one step acts "
+                "on it (rest), one body in a hundred is hit, or all are shaken.",
+                f"{BUILT}/contact/islands/islands --contacts 1000,10000 --mu 0.3,1 --sweeps 10000 --work 3e9"),
     "settling": ("Spheres that fall and settle, beside Bullet", "Residuals by `evaluate`, depth in parts of a radius.",
                  f"{BUILT}/contact/settling 3000 1 0"),
     "iftomm": ("The IFToMM mechanisms under `tether`",

@@ -31,57 +31,6 @@ bool is_solved(const Problem& p, const Options& o) {
   return true;
 }
 
-// A jittered face-centred lattice, neighbours nearer than `reach` in contact: two and a half
-// contacts a body, or four with a reach of 1.08 and a jitter of 0.05. mixed: radii from 0.45 to
-// 0.6, three and a half contacts a body.
-random::Packing close_packing(int cells, bool spheres, double mu, std::uint64_t seed,
-                              double jitter = 0.03, double reach = 1, bool mixed = false) {
-  random::Packing out = random::packing(1, spheres, seed);
-  out.contacts.clear();
-  random::Generator g(seed);
-  std::vector<Eigen::Vector3d> centre;
-  std::vector<double> radius;
-  const RigidBody pattern = out.bodies[0];
-  out.bodies.clear();
-  for (int k = 0; k < 4 * cells * cells * cells; ++k) {
-    const int cell = k / 4, corner = k % 4;
-    const Eigen::Vector3d origin(cell % cells, cell / cells % cells, cell / (cells * cells));
-    const Eigen::Vector3d offset(corner % 3 == 0 ? 0 : 0.5, corner == 1 || corner == 3 ? 0.5 : 0,
-                                 corner >= 2 ? 0.5 : 0);
-    centre.push_back(std::sqrt(2.0) * (origin + offset) + jitter * g.vector());
-    radius.push_back(mixed ? 0.5 * g.uniform(0.9, 1.2) : 0.5);
-    RigidBody body = pattern;
-    const double mass = std::pow(4, g.uniform(-0.5, 0.5)) * std::pow(2 * radius.back(), 3);
-    body.inverse_inertia *= 1 / (mass * body.inverse_mass);
-    body.inverse_mass = 1 / mass;
-    body.velocity = 0.3 * g.vector() - 0.1 * Eigen::Vector3d::UnitZ();
-    body.angular_velocity = 0.3 * g.vector();
-    out.bodies.push_back(body);
-  }
-  const auto touch = [&](int i, int j, const Eigen::Vector3d& normal) {
-    PointContact c;
-    c.first = i;
-    c.second = j;
-    c.mu = mu;
-    c.normal = normal;
-    const Eigen::Vector3d off =
-        spheres ? Eigen::Vector3d::Zero() : Eigen::Vector3d(0.1 * g.vector());
-    c.r1 = -radius[static_cast<std::size_t>(i)] * normal + off;
-    c.r2 = (j < 0 ? 0.5 : radius[static_cast<std::size_t>(j)]) * normal + off;
-    out.contacts.push_back(c);
-  };
-  for (int i = 0; i < static_cast<int>(centre.size()); ++i) {
-    const Eigen::Vector3d& p = centre[static_cast<std::size_t>(i)];
-    if (p.z() < 0.2) touch(i, -1, Eigen::Vector3d::UnitZ());
-    for (int j = 0; j < i; ++j) {
-      const Eigen::Vector3d d = p - centre[static_cast<std::size_t>(j)];
-      const double sum = radius[static_cast<std::size_t>(i)] + radius[static_cast<std::size_t>(j)];
-      if (d.norm() < reach * sum) touch(i, j, d.normalized());
-    }
-  }
-  return out;
-}
-
 }  // namespace
 
 TEST_CASE("packings: lattices of 1200 contacts are solved for the work of a few hundred sweeps") {
@@ -89,7 +38,7 @@ TEST_CASE("packings: lattices of 1200 contacts are solved for the work of a few 
   for (bool spheres : {true, false}) {
     for (double mu : {0.4, 0.7}) {
       for (std::uint64_t seed : {1, 2}) {
-        const random::Packing packing = close_packing(5, spheres, mu, seed);
+        const random::Packing packing = random::close_packing(5, spheres, mu, seed);
         const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
         Options o;
         o.law = Law::coulomb;
@@ -110,7 +59,7 @@ TEST_CASE("packings: 5300 contacts are solved by sweeps") {
   double work = 0;
   for (bool spheres : {true, false}) {
     for (double mu : {0.4, 0.7}) {
-      const random::Packing packing = close_packing(8, spheres, mu, spheres ? 42 : 43);
+      const random::Packing packing = random::close_packing(8, spheres, mu, spheres ? 42 : 43);
       const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
       REQUIRE(p.contacts() > 5000);
       Options o;
@@ -131,7 +80,7 @@ TEST_CASE("packings: 5300 contacts are solved by sweeps") {
 TEST_CASE("packings: parts that are unstable under sweeps follow them, 10600 contacts") {
   int found = 0;
   for (std::uint64_t seed : {1, 2, 3}) {
-    const random::Packing packing = close_packing(10, false, 1, seed);
+    const random::Packing packing = random::close_packing(10, false, 1, seed);
     const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
     REQUIRE(p.contacts() > 10000);
     Options o;
@@ -152,7 +101,7 @@ TEST_CASE("packings: solutions that repel sweeps are found by proximal problems 
   for (bool spheres : {true, false}) {
     for (double mu : {0.4, 0.55, 0.7, 0.85, 1.0}) {
       for (std::uint64_t seed : {1, 2}) {
-        const random::Packing packing = close_packing(4, spheres, mu, seed, 0.05, 1, true);
+        const random::Packing packing = random::close_packing(4, spheres, mu, seed, 0.05, 1, true);
         const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
         Options o;
         o.law = Law::coulomb;
@@ -177,7 +126,7 @@ TEST_CASE("packings: the few contacts that toggle are solved as problems of thei
   double work = 0;
   for (bool spheres : {true, false}) {
     for (std::uint64_t seed : {3, 4}) {
-      const random::Packing packing = close_packing(5, spheres, 1, seed);
+      const random::Packing packing = random::close_packing(5, spheres, 1, seed);
       const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
       Options o;
       o.law = Law::coulomb;
@@ -277,15 +226,15 @@ TEST_CASE("packings: sweeps that wander are followed by the path of interior poi
     o.max_work = 3e8;
     found += is_solved(p, o);
   };
-  look(close_packing(3, false, 0.85, 2, 0.03, 1, true));  // mixed radii
-  for (std::uint64_t seed : {1, 2, 3, 4})                 // four contacts a body
-    look(close_packing(3, true, 1, seed, 0.05, 1.08));
+  look(random::close_packing(3, false, 0.85, 2, 0.03, 1, true));  // mixed radii
+  for (std::uint64_t seed : {1, 2, 3, 4})                         // four contacts a body
+    look(random::close_packing(3, true, 1, seed, 0.05, 1.08));
   CHECK(found >= 4);
 }
 
 TEST_CASE("packings: bodies that sweeps leave unsolved are assembled, 1200 contacts by default") {
   for (bool spheres : {true, false}) {
-    const random::Packing p = close_packing(5, spheres, 1, spheres ? 33 : 2);
+    const random::Packing p = random::close_packing(5, spheres, 1, spheres ? 33 : 2);
     REQUIRE(p.contacts.size() > 1000);
     BodyOptions o;
     o.law = Law::coulomb;
