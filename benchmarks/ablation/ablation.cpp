@@ -1,8 +1,9 @@
 // Tether: steps, evaluations of F and end errors over all problems, as CSV.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// ablation [--without MECHANISM] [PROBLEM...]; ablation --mechanisms lists them. Those that are no
-// options can be switched off in builds with TETHER_ABLATION.
+// ablation [--without MECHANISM] [--times F] [PROBLEM...], tolerances times F; ablation
+// --mechanisms lists mechanisms. Those that are no options can be switched off in builds with
+// TETHER_ABLATION.
 #include <fmt/format.h>
 
 #include <cstdlib>
