@@ -41,7 +41,7 @@ TEST_CASE("four-bar linkage through its dead points", "[smooth]") {
       [](const Engine& e) {
         return in_plane(2 * e.bodies()[0].position, 0.328458111540815, 0.944518538178601);
       },
-      6000);
+      8000);
 }
 
 TEST_CASE("slider-crank of equal lengths through its dead points", "[smooth]") {
