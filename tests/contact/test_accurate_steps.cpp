@@ -295,6 +295,64 @@ TEST_CASE("accurate steps: free tops keep momentum and energy; memory goes on wi
       std::invalid_argument);
 }
 
+namespace {
+
+// A ball joint between a point of a body and the origin.
+class Pivot : public tc::JointEquations {
+ public:
+  Pivot(int body, const Vector3d& arm) : body_(body), arm_(arm) {}
+  int rows() const override { return 3; }
+  void values(const tc::BodySet& b, double, double* g) override {
+    Eigen::Map<Vector3d>{g} = b.position[at(body_)] + b.orientation[at(body_)] * arm_;
+  }
+  void add_rows(const tc::BodySet& b, double, tc::JointRows& rows) override {
+    const Vector3d arm = b.orientation[at(body_)] * arm_;
+    for (int k = 0; k < 3; ++k) {
+      rows.add(0, 0);
+      Vector6d G;
+      G << Vector3d::Unit(k), arm.cross(Vector3d::Unit(k));
+      rows.on(body_, G);
+    }
+  }
+
+ private:
+  int body_;
+  Vector3d arm_;
+};
+
+}  // namespace
+
+TEST_CASE("accurate steps: a pendulum that turns by more than a radian in a step") {
+  // J th'' = -m g l sin th, by steps of Runge and Kutta's order 4.
+  constexpr double l = 0.5, J = 0.1 + l * l, kGravity = 9.81, kEnd = 1.5;
+  double angle = 0, rate = 20;
+  constexpr int kSteps = 20000;
+  for (int k = 0; k < kSteps; ++k) {
+    const double h = kEnd / kSteps;
+    const auto slope = [&](double th) { return -kGravity * l / J * std::sin(th); };
+    const double a1 = slope(angle), r2 = rate + h / 2 * a1, a2 = slope(angle + h / 2 * rate),
+                 r3 = rate + h / 2 * a2, a3 = slope(angle + h / 2 * r2), r4 = rate + h * a3,
+                 a4 = slope(angle + h * r3);
+    angle += h / 6 * (rate + 2 * r2 + 2 * r3 + r4);
+    rate += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+  }
+  const double accuracy = GENERATE(1e-2, 1e-3, 1e-4);
+  CAPTURE(accuracy);
+  Scene scene(0.075);
+  scene.options.gravity = Vector3d(0, 0, -kGravity);
+  scene.options.accuracy = accuracy;
+  const int bob =
+      scene.bodies.add(1, 0.1 * Matrix3d::Identity(), Vector3d(0, 0, -l), Quaterniond::Identity(),
+                       Vector3d(20 * l, 0, 0), Vector3d(0, -20, 0));
+  tc::Stepper s = scene.stepper();
+  s.add_joints(std::make_unique<Pivot>(bob, Vector3d(0, 0, l)));
+  while (s.time() < kEnd - 1e-9) s.step();
+  // As many sub-steps as 1 / sqrt(accuracy), each of which may err by the accuracy.
+  CHECK((position(s, bob) - l * Vector3d(std::sin(angle), 0, -std::cos(angle))).norm() <
+        2 * std::sqrt(accuracy));
+  CHECK(s.counts().parts < 2000 / std::sqrt(accuracy / 1e-3));
+}
+
 TEST_CASE("accurate steps: the shortest part is that of the step, whatever a memory says") {
   for (const double next : {1e-300, 1e-15, 1e-11}) {
     INFO("next part " << next);

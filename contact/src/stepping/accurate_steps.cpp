@@ -55,6 +55,14 @@ void AccurateSteps::advance(double time, double length) {
   halving_.advance(halving_.whole(time, length));
 }
 
+// Joints that a sub-step does not resolve have halved it, and would halve its halves: the
+// difference of the two tells nothing of its error.
+bool AccurateSteps::resolves_joints(double time, double length) {
+  if (!stepper_.joints || !stepper_.joints_active) return true;
+  stepper_.set_now(halving_.whole(time, length));
+  return stepper_.resolves_joints();
+}
+
 // Lists what contacts have done in the sub-step just taken.
 void AccurateSteps::list_active(double length, std::vector<Active>& list) const {
   list.clear();
@@ -296,6 +304,13 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
   for (;;) {
     advance(time, length);
     if (!(length > shortest)) break;
+    if (!resolves_joints(time, length)) {
+      back();
+      length = std::max(length / 2, shortest);
+      cut = false;
+      control.last = 0;
+      continue;
+    }
     double at_once = length;
     const double impact = first_impact(length, at_once);
     if (impact < length) {
