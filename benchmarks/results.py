@@ -70,7 +70,7 @@ COMMANDS = {
               "Error: the largest distance of points of the bodies from the reference at ten equal times, m; sizes are near 1 m. "
               "References: `benchmarks/peers/references.py`. Times: processor time of the motion alone in ms, best of 3, at the "
               "errors that head the columns; \"-\": not within the limit of a run.",
-              "nice ninja -C build/release peers >&2 && python3 benchmarks/peers/peers.py build/release/benchmarks/peers"),
+              "cmake --build build/release --target peers >&2 && python3 benchmarks/peers/peers.py build/release/benchmarks/peers"),
     "verify": ("Shipped scenes judged by an independent checker",
                "At most 0.3 s of each scene, every step, by `scene/tools/verify.py`, which shares no code with Tether. Judgements are those of "
                "contact forces, joints and balances of impulses.",
