@@ -148,7 +148,7 @@ std::vector<HardCase> motions() {
       motion(
           "A02 four-bar, N = 2, t = 10", "rank drops twice a turn", "one angle, long double",
           forms("index 1", pinned_rods_forms(), [](auto& form) { return n_four_bar(2, 10, form); }),
-          1e-4),
+          1e-4, 1e-7),
       motion(
           "A02 four-bar, N = 10, t = 2", "rank drops by 10", "one angle, long double",
           forms("index 0", pinned_rods_forms(), [](auto& form) { return n_four_bar(10, 2, form); }),

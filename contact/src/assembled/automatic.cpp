@@ -24,9 +24,6 @@ constexpr double kExpensive = 30;
 
 constexpr double kGain = 0.7;  // a stage that leaves more than this part of the error has stalled
 
-constexpr double kStay = 3;          // factorisations, that sweeps are worth in any case
-constexpr double kPartsShare = 0.1;  // of the work before, that solves of parts may take at once
-
 // The slip is differentiable at every contact.
 bool is_regular(const System& system) {
   for (int i = 0; i < system.size(); ++i) {
@@ -79,7 +76,7 @@ Status Automatic::rotate(Search& search, int most_idle) {
     turn(regular && !expensive && first, [&] { interior_points(search, by_bodies); });
     turn(true, [&] { rounding = at_round_off(search); });
     turn(regular && !expensive && first && !by_bodies, [&] { proximal_path_at_best(search); });
-    turn(regular && first, [&] { interior_.run_arclength(search, kFactorisations); });
+    turn(regular && first, [&] { interior_.run_arclength(search, kFactorisations, newton_); });
     turn(true, [&] { rounding = at_round_off(search); });
     if (solved) return Status::solved;
     if (!rounding && search.exhausted()) return Status::work_limit;
@@ -139,10 +136,10 @@ Status Automatic::run(Search& search) {
 // Sweeps for half the price of a factorisation, with a guessed fill; then orders the matrix, which
 // gives the exact price. False: solved, or no work is left.
 bool Automatic::order_after_sweeps(Search& search) {
-  constexpr double kBeforeOrdering = 0.5;  // factorisations
+  constexpr double kBeforeOrdering = 0.5, kLeaveBeyond = 3;  // factorisations
   const double price = interior_.cost(search);
   AcceleratedSweeps::Leave leave;
-  leave.price = kStay * price;
+  leave.price = kLeaveBeyond * price;
   leave.least_work = kBeforeOrdering * price;
   sweeps_.run(search, leave);
   if (search.solved() || search.exhausted()) return false;
@@ -153,7 +150,7 @@ bool Automatic::order_after_sweeps(Search& search) {
 // Sweeps take turns with solves of the parts in which they do not settle, until the work `until` is
 // done. Solves that do not reduce the error become rarer.
 void Automatic::sweep_and_solve_parts(Search& search, double until) {
-  constexpr double kShare = 0.5;                                      // of the work before
+  constexpr double kShare = 0.5, kCheap = 0.1, kPartShare = 0.1;      // of the work before
   constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
   const double begin = search.counts.work;
   double in_parts = 0, halved = search.best_error, between = kBetween;
@@ -173,9 +170,9 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
     const double before = search.counts.work;
     if (in_parts > kShare * (before - begin)) continue;
     x_.assign(sweeps_.point(), sweeps_.point() + contacts_);
-    const bool changed = parts_.run(search, x_, kPartsShare * before);
+    const bool changed = parts_.run(search, x_, kPartShare * before);
     in_parts += search.counts.work - before;
-    if (!changed || in_parts > kPartsShare * (before - begin))
+    if (!changed || in_parts > kCheap * (before - begin))
       between = std::min(kMostBetween, kGrowth * between);
     if (!changed) continue;
     search.test(x_.data(), By::sweeps);
@@ -186,12 +183,16 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
 // Sweeps for the price of a few factorisations, and longer while they forecast less than
 // kLeaveBeyond of them. Returns whether a factorisation is expensive.
 bool Automatic::sweep(Search& search, bool first, bool by_bodies) {
-  constexpr double kStayIfExpensive = 40, kLeaveBeyond = 20;  // factorisations
+  constexpr double kStay = 3, kStayByBodies = 5, kStayIfExpensive = 40,
+                   kLeaveBeyond = 20;  // factorisations
   const double begin = search.counts.work;
   if (first && !interior_.ordered() && !order_after_sweeps(search)) return false;
   const double price = interior_.cost(search);
   const bool expensive = !by_bodies && price > kExpensive * search.sweep_cost;
-  const double until = begin + (expensive ? kStayIfExpensive : kStay) * price;
+  const double until = begin + (by_bodies   ? kStayByBodies
+                                : expensive ? kStayIfExpensive
+                                            : kStay) *
+                                   price;
   if (expensive) sweep_and_solve_parts(search, until);
   if (search.solved() || search.exhausted()) return expensive;
   AcceleratedSweeps::Leave leave;
@@ -204,9 +205,10 @@ bool Automatic::sweep(Search& search, bool first, bool by_bodies) {
 // Sweeps may pass a solution that repels them; proximal problems from their present point may reach
 // it. If one of these fails, the place was wrong, and sweeps go on to another.
 void Automatic::proximal_path(Search& search) {
+  constexpr int kProblems = 100;
   const double end = search.work_end;
   search.work_end = std::min(end, 2 * search.counts.work);
-  interior_.run_proximal(search, sweeps_.point(), newton_);
+  interior_.run_proximal(search, sweeps_.point(), kProblems, newton_);
   search.work_end = end;
 }
 
@@ -220,25 +222,30 @@ void Automatic::interior_points(Search& search, bool by_bodies) {
   solve_parts_of_end(search);
 }
 
-// From where interior points end proximal problems may reach a solution. The first one that fails
-// ends the attempt, except with heavy bodies on light ones: there x has far to go.
+// If the path of interior points ends near a solution, a few proximal problems reach it. The
+// first one that fails ends the attempt, except with heavy bodies on light ones: there x has far to
+// go, and more problems are allowed.
 void Automatic::proximal_path_at_best(Search& search) {
+  constexpr double kRough = 1e-2;
+  constexpr int kProblems = 20, kMost = 60;
+  if (search.best_error > kRough) return;
   x_ = search.best;
   const bool loaded = search.system.load(x_.data()) > kOrdinaryLoad;
-  interior_.run_proximal(search, x_.data(), newton_, loaded);
+  interior_.run_proximal(search, x_.data(), loaded ? kMost : kProblems, newton_, loaded);
 }
 
 // With large mass ratios the products x.u of separating contacts and of contacts under heavy bodies
 // differ by more digits than a double has. Interior points then leave a few separated contacts
 // unsolved, far from each other, which are solved as parts.
 void Automatic::solve_parts_of_end(Search& search) {
+  constexpr double kShare = 0.1;  // of the work before
   constexpr int kRounds = 8;
   if (!search.near_round_off() || search.solved() || search.exhausted()) return;
   const double before = search.counts.work;
   x_ = interior_.impulses();
   end_parts_.reset(contacts_);
-  for (int round = 0; round < kRounds && search.counts.work < (1 + kPartsShare) * before; ++round) {
-    if (!end_parts_.run(search, x_, kPartsShare * before)) return;
+  for (int round = 0; round < kRounds && search.counts.work < (1 + kShare) * before; ++round) {
+    if (!end_parts_.run(search, x_, kShare * before)) return;
     search.test(x_.data(), By::factors);
     if (search.solved() || search.exhausted()) return;
   }
@@ -261,6 +268,7 @@ void Automatic::follow_to_the_end(Search& search) {
 // smaller impulses.
 void Automatic::proximal_path_from_small(Search& search) {
   constexpr double kGrown = 10;  // times the impulses by which all stick
+  constexpr int kProblems = 60;
   if (!(interior_.size_over_sticking(search, search.best.data()) > kGrown)) return;
   const double before = search.best_error;
   for (double small : {1e-3, 1e-6}) {
@@ -269,7 +277,7 @@ void Automatic::proximal_path_from_small(Search& search) {
       for (double& c : v.v) c *= small;
     search.system.sweep(x_.data());
     search.count_sweep();
-    interior_.run_proximal(search, x_.data(), newton_, true);
+    interior_.run_proximal(search, x_.data(), kProblems, newton_, true);
     if (search.solved() || search.exhausted() || search.best_error < kGain * before) return;
   }
 }

@@ -181,7 +181,7 @@ int ProximalNewton::correct(Search& search, double tau, const PackedVector* anch
 
 void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
   std::copy(x, x + n_, x_.begin());
-  double tau = 1e-4;
+  double tau = 1e-4, tau_failed = 0;
   double reference = search.best_error;
   int since_gain = 0, failures = 0;
   for (int outer = 0; outer < most; ++outer) {
@@ -195,6 +195,7 @@ void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
       return;
     }
     if (steps < 0) {
+      tau_failed = tau;
       tau = std::min(5 * tau, 10.0);
       std::copy(anchor_.begin(), anchor_.end(), x_.begin());
       if (++failures >= 4) return;
@@ -206,7 +207,8 @@ void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
     } else if (steps <= 4) {
       tau *= 0.2;
     }
-    tau = std::max(tau, 1e-12);
+    tau_failed *= 0.8;
+    tau = std::max({tau, 2.5 * tau_failed, 1e-12});
   }
 }
 

@@ -41,7 +41,7 @@ struct InteriorPoint::ArclengthPath {
   InteriorPoint& own;
   Search& search;
   SmoothedPairs pairs;
-  double step = 0.5;    // of size()
+  double step = 0.5;    // in parts of what changes the first contact's regime
   Packed newton, rate;  // to the curve, with newton_log_nu; d / d log nu along it
   double newton_log_nu = 0;
   Tangent tangent;
@@ -74,23 +74,24 @@ struct InteriorPoint::ArclengthPath {
     return true;
   }
 
-  // In parts of what changes the first contact's regime, or log nu by kLogNu.
-  double size(const Packed& z, double log_nu) const {
-    constexpr double kLogNu = 3;
-    return std::max(pairs.largest(z), std::abs(log_nu) / kLogNu);
-  }
   // How many times Newton's direction could be followed.
-  double reach() const { return 1 / size(newton, newton_log_nu); }
+  double reach() const {
+    constexpr double kLogNu = 3;
+    return 1 / std::max(pairs.largest(newton), std::abs(newton_log_nu) / kLogNu);
+  }
 
   void go_along(const Tangent& along) {
-    const double length = step / size(along.z, along.log_nu);
+    constexpr double kMostFall = 4.6, kMostRise = 2;  // of log nu
+    double length = step / pairs.largest(along.z);
+    if (along.log_nu < 0) length = std::min(length, kMostFall / -along.log_nu);
+    if (along.log_nu > 0) length = std::min(length, kMostRise / along.log_nu);
     pairs.move(along.z, length, length * along.log_nu);
     evaluate();
   }
 
   // A shorter step from the last point; false: none is left.
   bool go_back() {
-    constexpr double kShorter = 0.25;
+    constexpr double kShorter = 0.25, kLeast = 1e-3;
     step *= kShorter;
     if (step < kLeast) return false;
     pairs.go_to(last.place);
@@ -100,6 +101,7 @@ struct InteriorPoint::ArclengthPath {
 
   // The first point: Newton's method at constant nu.
   bool begin(double nu) {
+    constexpr double kLeast = 1e-3;
     constexpr int kMost = 40;
     pairs.take(own.point_, nu);
     evaluate();
@@ -119,24 +121,27 @@ struct InteriorPoint::ArclengthPath {
 
   // Along the curve and back to it; false: it is lost.
   bool go_on() {
-    // A direction that could be followed once is taken, and is the last one where it could be kLast
-    // times.
-    constexpr double kFewer = 0.7, kMore = 1.7;
+    // A direction that could be followed for so long is taken, and is the last one where it could
+    // be for longer. The next one may not be much shorter.
+    constexpr double kTaken = 1, kFewer = 0.7, kMore = 1.7, kLongest = 1;
     constexpr int kMost = 6, kMany = 3;
     go_along(tangent);
+    double before = 0;
     for (int iteration = 1; !search.exhausted(); ++iteration) {
       const double longest = directions(true) ? reach() : 0;
       const bool near = longest >= kLast;
-      if (!near && (!(longest >= 1) || iteration > kMost)) {
+      if (!near && (!(longest >= std::max(kTaken, kFewer * before)) || iteration > kMost)) {
         if (!go_back()) return false;
         iteration = 0;
+        before = 0;
         continue;
       }
+      before = longest;
       const double length = std::min(1.0, kInside * longest);
       pairs.move(newton, length, length * newton_log_nu);
       evaluate();
       if (!near) continue;
-      if (iteration == 1) step = std::min(1.0, kMore * step);
+      if (iteration == 1) step = std::min(kLongest, kMore * step);
       if (iteration >= kMany) step *= kFewer;
       last = {pairs.place(), tangent};
       return true;
@@ -144,14 +149,16 @@ struct InteriorPoint::ArclengthPath {
     return false;
   }
 
-  static constexpr double kLast = 4, kInside = 0.9, kLeast = 1e-3;
+  static constexpr double kLast = 4, kInside = 0.9;
 };
 
-void InteriorPoint::run_arclength(Search& search, int most) {
+void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newton) {
   // The shift, relative to A, keeps digits where contacts stick: there 1 / W^2 = x / u grows
   // without bound, and takes those of the bodies that slide.
   constexpr double kShift = 1e-11, kNear = 1, kFar = 1e5, kFarther = 100;
   constexpr double kTested = 1e-5, kEnd = 1e-24;  // of the first nu
+  constexpr double kTry = 1e-6, kGain = 0.1;
+  constexpr int kFirstProblems = 3, kLastProblems = 30;
   const int end = search.counts.factorisations + most;
   equations_.set_tau(0);
   equations_.set_exact(false);
@@ -164,12 +171,19 @@ void InteriorPoint::run_arclength(Search& search, int most) {
     first = equations_.complementarity(point_);
     on_path = path.begin(first);
   }
-  for (; on_path; on_path = path.go_on()) {
-    if (search.exhausted() || search.counts.factorisations > end) return;
+  const bool begun = on_path;
+  for (double tried = kTry; on_path; on_path = path.go_on()) {
+    if (search.exhausted() || search.counts.factorisations > end) break;
     if (path.pairs.nu() > kTested * first) continue;
-    test_point(search);
-    if (search.solved() || path.pairs.nu() < kEnd * first) return;
+    const double error = test_point(search);
+    if (search.solved() || search.exhausted()) return;
+    if (path.pairs.nu() < kEnd * first) break;
+    if (!(error < kTry && search.best_error < kGain * tried)) continue;
+    tried = search.best_error;
+    newton.run(search, search.best.data(), kFirstProblems);
+    if (search.solved()) return;
   }
+  if (begun && !search.exhausted()) newton.run(search, search.best.data(), kLastProblems);
 }
 
 }  // namespace tether::contact::detail

@@ -24,15 +24,15 @@ class InteriorPoint {
   const Packed& impulses() const { return equations_.impulses(); }
   // From near x.
   void run_near(Search& search, const PackedVector* x, int most);
-  // Proximal point iteration from x, problems A + tau D, b + tau D x, which a small
+  // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
   // tau D makes solvable where the path of the problem itself ends. Each is solved by a few steps
   // of `newton` from the point to which the last step leads or, where that fails, along its own
   // path. whole: where one cannot be solved a larger tau is tried, else it ends there.
-  void run_proximal(Search& search, const PackedVector* x, ProximalNewton& newton,
+  void run_proximal(Search& search, const PackedVector* x, int most, ProximalNewton& newton,
                     bool whole = false);
-  // The path of run() by its arclength, through the turns where its steps are blocked. At most
-  // `most` factorisations.
-  void run_arclength(Search& search, int most);
+  // The path of run() by its arclength, through the turns where its steps are blocked; `newton`
+  // finishes. At most `most` factorisations.
+  void run_arclength(Search& search, int most, ProximalNewton& newton);
   // Orders the matrix, so that cost() knows its fill.
   void order(Search& search);
   bool by_bodies() const { return newton_.matrix().by_bodies(); }

@@ -8,22 +8,22 @@ namespace tether::contact::detail {
 
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
 // solution, x drifts at a constant rate until one of them changes (method, section 6).
-void InteriorPoint::run_proximal(Search& search, const PackedVector* x, ProximalNewton& newton,
-                                 bool whole) {
-  constexpr int kProblems = 60, kCorrections = 4, kSteps = 20, kSweeps = 3;
+void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most,
+                                 ProximalNewton& newton, bool whole) {
+  constexpr int kCorrections = 4, kSteps = 20, kSweeps = 3;
   constexpr double kFirst = 1e-2, kLeast = 1e-9, kMost = 1;  // tau, for ordinary loads
-  constexpr double kNear = 1e-4;
+  constexpr double kLightest = 1e6, kNear = 1e-4;
   System& system = search.system;
   Packed rate(at(n_)), point(at(n_));  // rate: tau (x_k+1 - x_k)
   equations_.set_anchor(x);
   const Packed& anchor = equations_.anchor();
   // Impulses that carry heavy bodies over light ones are |A| |x| times what moves; for x to change
   // by its size at the rate of what is left tau has to be as much smaller.
-  const double lighter = std::min(1 / kRoundOff, std::max(1.0, system.load(x) / kOrdinaryLoad));
+  const double lighter = std::min(kLightest, std::max(1.0, system.load(x) / kOrdinaryLoad));
   const double least = kLeast / lighter;
   double tau = kFirst / lighter;
   bool drifting = false;
-  for (int outer = 0; outer < kProblems; ++outer) {
+  for (int outer = 0; outer < most; ++outer) {
     int corrections = 0;
     if (drifting) {
       for (int i = 0; i < n_; ++i)
