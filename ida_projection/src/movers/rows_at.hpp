@@ -24,7 +24,6 @@ struct Solution {
   Status status = Status::success;
   double length = 0.0;  ///< WRMS, in tolerances, of what the error test sees
   double left = 0.0;    ///< the part of it that an iterative solution has left
-  bool follows = true;  ///< do the rows that the factors leave out follow from the others?
 };
 
 /// The purpose of a solution.

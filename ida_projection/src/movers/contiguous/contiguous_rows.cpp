@@ -197,15 +197,14 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
     }
   }
   // A polish moves few rows by too little to tell.
-  const bool tells = how != Solve::rest || Rows::kSparse || traits.measures_rest;
-  found.follows = !tells || dropped_follow();
-  if (!found.follows && Rows::kKeepsRank) {
+  const bool tells = how != Solve::rest || traits.measures_rest;
+  if (Rows::kKeepsRank && tells && !dropped_follow()) {
     uses_.lasting = false;
     if ((found.status = factor(t_, false)) != Status::success) return found;
     blocks_.solve(g_);
     found.length = length_of_solution();
     if (uses_.thin) found.length = judge_thin_rows(found.length);
-    found.follows = dropped_follow();
+    (void)dropped_follow();  // notes what they ask for now
   }
   length_ = found.length;
   return found;
