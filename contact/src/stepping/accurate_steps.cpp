@@ -47,20 +47,15 @@ double zero_behind(double ta, double a, double tb, double b) {
 
 }  // namespace
 
-// Scales the warm start by the ratio of lengths, at most 2.
-void AccurateSteps::advance(double time, double length) {
+// Scales the warm start by the ratio of lengths, at most 2. False: joints have halved the sub-step,
+// and would halve its halves; the difference of the two tells nothing of its error.
+bool AccurateSteps::advance(double time, double length) {
+  const long before = halving_.halved_by_joints();
   if (stepper_.solver && control.length > 0)
     stepper_.solver->scale_warm_start(std::min(2.0, length / control.length));
   control.length = length;
   halving_.advance(halving_.whole(time, length));
-}
-
-// Joints that a sub-step does not resolve have halved it, and would halve its halves: the
-// difference of the two tells nothing of its error.
-bool AccurateSteps::resolves_joints(double time, double length) {
-  if (!stepper_.joints || !stepper_.joints_active) return true;
-  stepper_.set_now(halving_.whole(time, length));
-  return stepper_.resolves_joints();
+  return halving_.halved_by_joints() == before;
 }
 
 // Lists what contacts have done in the sub-step just taken.
@@ -302,9 +297,9 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
   };
   bool cut = shortened, switched = false;
   for (;;) {
-    advance(time, length);
+    const bool whole = advance(time, length);
     if (!(length > shortest)) break;
-    if (!resolves_joints(time, length)) {
+    if (!whole) {
       back();
       length = std::max(length / 2, shortest);
       cut = false;

@@ -43,8 +43,7 @@ class AccurateSteps {
   struct Moment {
     double when, early;  // s
   };
-  void advance(double time, double length);
-  bool resolves_joints(double time, double length);
+  bool advance(double time, double length);
   double take_sub_step(double time, double length, bool shortened, double shortest);
   bool take_halves(double time, double length);
   void accept(double time, double length, double error, bool smooth, bool cut);

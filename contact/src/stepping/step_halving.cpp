@@ -20,6 +20,7 @@ int StepHalving::advance(SubStep s) {
   stepper_.set_now(s);
   if (stepper_.joints && stepper_.joints_active && s.joint_halvings > 0 &&
       !stepper_.resolves_joints()) {
+    ++halved_by_joints_;
     --s.joint_halvings;
     return take_halves(s);
   }
@@ -29,6 +30,7 @@ int StepHalving::advance(SubStep s) {
   if (end == SubStepEnd::cut) return cutting_.take(s);
   if (end == SubStepEnd::woken) return advance(s);
   if (end == SubStepEnd::unmet) {
+    ++halved_by_joints_;
     --s.joint_halvings;
   } else {
     stepper_.solver->take_back();

@@ -16,12 +16,15 @@ class StepHalving {
   SubStep whole(double start, double length) const;
   /// Returns how many cuts are left.
   int advance(SubStep s);
+  /// How often joints have halved a sub-step so far.
+  long halved_by_joints() const { return halved_by_joints_; }
 
  private:
   int take_halves(const SubStep& s);
 
   SubStepper& stepper_;
   StepCutting cutting_;
+  long halved_by_joints_ = 0;
 };
 
 }  // namespace tether::contact::detail
