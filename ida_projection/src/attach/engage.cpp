@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "attach/impl.hpp"
-#include "fast/quicken.hpp"
+#include "fast/kernels.hpp"
 #include "host/mechanisms.hpp"
 
 namespace tether::ida_projection {
@@ -110,8 +110,8 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   if (options_.nonlinear_solver == nullptr)
     newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
   const StepData step = ida_.step();
-  fast::quicken({candidate.correction, step.residual, polish_.delta(), polish_.corrected()});
-  fast::quicken_with_inputs({step.y_predicted, step.yp_predicted, candidate.weights, newton});
+  fast::quicken({candidate.correction, step.residual, polish_.delta(), polish_.corrected()}, false);
+  fast::quicken({step.y_predicted, step.yp_predicted, candidate.weights, newton}, true);
 }
 
 // Until a first move is needed IDA is left alone, bit for bit: then this attempt is finished, and

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 #include <tether/ida_projection.h>
+#include <tether/ida_projection/sundials_build.hpp>
+#include <type_traits>
 
 namespace tether::ida_projection::c {
 
@@ -19,21 +21,57 @@ inline int fail(int flag, const char* text) noexcept {
   return flag;
 }
 
-// An argument in error, e.g. "tether_add_rows: count = 0, must be at least 1".
-inline int ill(const std::string& text) { return fail(TETHER_ILL_INPUT, text.c_str()); }
-inline int null(const char* function, const char* argument) {
-  return fail(TETHER_MEM_NULL, (std::string(function) + ": " + argument + " is null").c_str());
-}
+/// An error of a call, for guarded().
+struct Error {
+  int flag;
+  std::string text;
+};
 
-// Every function that C calls: no exception gets out.
-template <class Function>
-int guarded(Function&& function) noexcept {
+/// The arguments of a function for C; errors name both.
+class Arguments {
+ public:
+  explicit Arguments(const char* function) : function_(function) {}
+  /// "tether_add_rows: value is null".
+  template <class Pointer>
+  void require(const Pointer& argument, const char* name) const {
+    if (argument == nullptr)
+      throw Error{TETHER_MEM_NULL, std::string(function_) + ": " + name + " is null"};
+  }
+  [[noreturn]] void refuse(const std::string& text) const {
+    throw Error{TETHER_ILL_INPUT, std::string(function_) + ": " + text};
+  }
+  /// "tether_add_rows: count = 0, must be at least 1".
+  template <class Number>
+  void check(bool right, const char* name, Number value, const char* allowed) const {
+    if (!right) refuse(std::string(name) + " = " + std::to_string(value) + ", must be " + allowed);
+  }
+  void check_build(const tether_sundials_build* host) const {
+    require(host, "host");
+    try {
+      check_running_sundials(*host);
+    } catch (const std::runtime_error& error) {
+      throw Error{TETHER_WRONG_SUNDIALS, error.what()};
+    }
+  }
+
+ private:
+  const char* function_;
+};
+
+/// The body of a function that C calls: no exception gets out. Returns its int, or 0.
+template <class Body>
+int guarded(const char* function, Body&& body) noexcept {
   try {
     last_error[0] = 0;
-    return function();
+    if constexpr (std::is_void_v<std::invoke_result_t<Body&, Arguments>>)
+      return body(Arguments(function)), 0;
+    else
+      return body(Arguments(function));
+  } catch (const Error& error) {
+    return fail(error.flag, error.text.c_str());
   } catch (const std::bad_alloc&) {
     return fail(TETHER_MEM_FAIL, "out of memory");
-  } catch (const std::invalid_argument& error) {
+  } catch (const std::logic_error& error) {  // std::invalid_argument, or a call out of turn
     return fail(TETHER_ILL_INPUT, error.what());
   } catch (const std::exception& error) {
     return fail(TETHER_INTERNAL_ERROR, error.what());

@@ -4,10 +4,9 @@
 // Compiled without contraction to fused multiply-adds and without -ffast-math: bits count.
 #include "kernels.hpp"
 
-#include "fast/quicken.hpp"
-
 #include <nvector/nvector_serial.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -202,7 +201,7 @@ struct Kernels {
 
   // The same for results whose arguments get these operations, too.
   static void spread(N_Vector X) {
-    if (X->ops->nvlinearsum != linear_sum) quicken({X});
+    if (X->ops->nvlinearsum != linear_sum) quicken({X}, false);
   }
   static int combination_of_others(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
     for (int k = 0; k < count; ++k) spread(X[k]);
@@ -236,7 +235,7 @@ struct Kernels {
     return 0;
   }
 
-  static void install(N_Vector_Ops ops) {
+  static void install(N_Vector_Ops ops, bool spreading) {
     ops->nvgetarraypointer = array_pointer;
     ops->nvlinearsum = linear_sum;
     ops->nvconst = constant;
@@ -255,9 +254,7 @@ struct Kernels {
         ops->nvlinearcombination ? enabled_linear_combination : linear_combination;
     ops->nvlinearsumvectorarray = linear_sums;
     ops->nvscalevectorarray = scale_each;
-  }
-  static void install_spreading(N_Vector_Ops ops) {
-    install(ops);
+    if (!spreading) return;
     ops->nvlinearcombination = combination_of_others;
     ops->nvscale = scale_of_other;
     ops->nvinv = inverse_of_other;
@@ -265,22 +262,15 @@ struct Kernels {
 };
 
 template <int... Lengths>
-void install_sized(N_Vector_Ops ops, sunindextype length, bool spreading,
-                   std::integer_sequence<int, Lengths...>) {
-  static constexpr void (*install[])(N_Vector_Ops) = {Kernels<Lengths>::install...};
-  static constexpr void (*install_spreading[])(N_Vector_Ops) = {
-      Kernels<Lengths>::install_spreading...};
-  (spreading ? install_spreading : install)[length <= kSized ? length : 0](ops);
+constexpr auto install_sized(std::integer_sequence<int, Lengths...>) {
+  return std::array{Kernels<Lengths>::install...};
 }
 
 }  // namespace
 
-void install_kernels(N_Vector_Ops ops, sunindextype length) {
-  install_sized(ops, length, false, std::make_integer_sequence<int, kSized + 1>());
-}
-
-void install_spreading_kernels(N_Vector_Ops ops, sunindextype length) {
-  install_sized(ops, length, true, std::make_integer_sequence<int, kSized + 1>());
+void install_kernels(N_Vector_Ops ops, sunindextype length, bool spreading) {
+  static constexpr auto install = install_sized(std::make_integer_sequence<int, kSized + 1>());
+  install[static_cast<std::size_t>(length <= kSized ? length : 0)](ops, spreading);
 }
 
 }  // namespace tether::ida_projection::fast

@@ -6,6 +6,7 @@
 // last. Cases that round alike are one case here: 1 x and -1 x are exact.
 #pragma once
 
+#include <initializer_list>
 #include <sundials/sundials_nvector.h>
 
 namespace tether::ida_projection::fast {
@@ -13,11 +14,16 @@ namespace tether::ida_projection::fast {
 /// Vectors up to this length have kernels of their own length.
 constexpr sunindextype kSized = 16;
 
-/// Overwrites the operations of a vector that has `length` elements.
-void install_kernels(N_Vector_Ops ops, sunindextype length);
+/// Overwrites the operations of a vector that has `length` elements. `spreading`: vectors that are
+/// combined, scaled or inverted into this one are made fast by quicken().
+void install_kernels(N_Vector_Ops ops, sunindextype length, bool spreading);
 
-/// The same, and vectors that are combined, scaled or inverted into this one are made fast by
-/// quicken().
-void install_spreading_kernels(N_Vector_Ops ops, sunindextype length);
+/// Gives serial vectors of one length the kernels of fast_vector(), which have the bits of what
+/// they replace. A vector of another kind, or with an operation that SUNDIALS did not put there (a
+/// program may count or change them), stays as it is; so do null pointers. `with_inputs`: also all
+/// that is combined, scaled or inverted into one of them from now on: IDA's history, of which its
+/// predictions are made; tolerances, of which its weights are; what a linear solver returns, of
+/// which corrections are.
+void quicken(std::initializer_list<N_Vector> vectors, bool with_inputs);
 
 }  // namespace tether::ida_projection::fast

@@ -1,41 +1,39 @@
-// Tether: an N_Vector with an owner. SPDX-License-Identifier: BSD-3-Clause
+// Tether: objects of SUNDIALS with an owner. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <new>
 #include <sundials/sundials_nvector.h>
-#include <utility>
+#include <type_traits>
 
 namespace tether::ida_projection {
+
+template <auto Function>
+struct FreeBy {
+  template <class Object>
+  void operator()(Object* object) const {
+    Function(object);
+  }
+};
+/// An object that `Free` takes back, e.g. Owned<SUNMatrix, SUNMatDestroy>.
+template <class Pointer, auto Free>
+using Owned = std::unique_ptr<std::remove_pointer_t<Pointer>, FreeBy<Free>>;
 
 /// Is this vector contiguous and whole in this process's memory?
 bool is_contiguous(N_Vector v);
 
 /// An N_Vector owned by the plugin; null when empty.
-class OwnedVector {
+class OwnedVector : public Owned<N_Vector, N_VDestroy> {
  public:
   OwnedVector() = default;
   /// Throws std::bad_alloc where the vector cannot be cloned.
   explicit OwnedVector(N_Vector like) {
     if (like == nullptr) return;
-    // N_VClone writes into what it gets, null or not.
-    v_ = like->ops->nvclone(like);
-    if (v_ == nullptr) throw std::bad_alloc();
-    v_->sunctx = like->sunctx;
+    reset(like->ops->nvclone(like));  // N_VClone writes into what it gets, null or not
+    if (get() == nullptr) throw std::bad_alloc();
+    get()->sunctx = like->sunctx;
   }
-  ~OwnedVector() {
-    if (v_ != nullptr) N_VDestroy(v_);
-  }
-  OwnedVector(OwnedVector&& other) noexcept : v_(std::exchange(other.v_, nullptr)) {}
-  OwnedVector& operator=(OwnedVector&& other) noexcept {
-    std::swap(v_, other.v_);
-    return *this;
-  }
-  OwnedVector(const OwnedVector&) = delete;
-  OwnedVector& operator=(const OwnedVector&) = delete;
-  operator N_Vector() const { return v_; }
-
- private:
-  N_Vector v_ = nullptr;
+  operator N_Vector() const { return get(); }
 };
 
 }  // namespace tether::ida_projection

@@ -2,32 +2,54 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <dlfcn.h>
+#include <link.h>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <tether/ida_preload.h>
 
-#include "preload/sundials_in_use.hpp"
+#include "host/owned_vector.hpp"
 
 namespace {
 
-using tether::ida_projection::preload::sundials_function;
+using tether::ida_projection::Owned;
 
-template <class T, void (*free)(T*)>
-struct Freed {
-  void operator()(T* object) const { free(object); }
-};
-template <class T, void (*free)(T*)>
-using Owned = std::unique_ptr<T, Freed<T, free>>;
+int complain(const char* what, const char* why) {
+  std::fprintf(stderr, "libtether_preload: %s: %s\n", what, why);
+  return IDA_ILL_INPUT;
+}
 
-void destroy(_generic_N_Vector* v) { N_VDestroy(v); }
+// A host's module (as Octave's) may have loaded SUNDIALS for itself alone. IDA and the libraries
+// below it become visible to all, which our own calls into SUNDIALS need.
+int make_visible(dl_phdr_info* object, std::size_t, void* ida) {
+  const char* slash = object->dlpi_name ? std::strrchr(object->dlpi_name, '/') : nullptr;
+  const char* file = slash ? slash + 1 : object->dlpi_name;
+  if (!file || std::strncmp(file, "libsundials_", 12) != 0) return 0;
+  void* handle = dlopen(object->dlpi_name, RTLD_LAZY | RTLD_NOLOAD | RTLD_GLOBAL);
+  if (handle && std::strncmp(file, "libsundials_ida", 15) == 0) *static_cast<void**>(ida) = handle;
+  return 0;
+}
+
+/// The program's own IDA function of this name, which stands behind ours; null: it has none loaded.
+template <class Function>
+Function* behind(const char* name) noexcept {
+  void* next = dlsym(RTLD_NEXT, name);
+  if (!next) {
+    void* ida = nullptr;
+    dl_iterate_phdr(make_visible, &ida);
+    next = ida ? dlsym(ida, name) : nullptr;
+  }
+  if (!next) complain(name, "no SUNDIALS is loaded");
+  return reinterpret_cast<Function*>(next);
+}
 
 struct Host {
-  Owned<_generic_N_Vector, destroy> start;  // IDAInit's y, until the rows are attached
+  Owned<N_Vector, N_VDestroy> start;  // IDAInit's y, until the rows are attached
   SUNNonlinearSolver nonlinear_solver = nullptr;
   bool asked = false, refused = false, project_output = false;
-  Owned<tether_projection, tether_projection_free> projection;
+  Owned<tether_projection*, tether_projection_free> projection;
 };
 
 std::recursive_mutex mutex;
@@ -48,11 +70,6 @@ struct Ours {
 };
 
 tether_preload_fn registered = nullptr;
-
-int complain(const char* what, const char* why) {
-  std::fprintf(stderr, "libtether_preload: %s: %s\n", what, why);
-  return IDA_ILL_INPUT;
-}
 
 /// The user's function; null without TETHER_CONSTRAINTS, or where it cannot be used (said once).
 tether_preload_fn constraints_of_the_user(bool& failed) {
@@ -82,7 +99,7 @@ int attach(void* ida_mem, Host& host) {
   const auto ask = constraints_of_the_user(failed);
   if (failed) return IDA_ILL_INPUT;
   if (!ask || !host.start) return IDA_SUCCESS;
-  const Owned<tether_constraints, tether_constraints_free> rows(tether_constraints_new());
+  const Owned<tether_constraints*, tether_constraints_free> rows(tether_constraints_new());
   if (!rows) return complain("no memory", tether_last_error());
   tether_options options;
   tether_options_init(&options, sizeof options);
@@ -153,16 +170,16 @@ void tether_preload_ask(tether_preload_fn ask) {
 }
 
 int IDAInit(void* ida_mem, IDAResFn res, sunrealtype t0, N_Vector yy0, N_Vector yp0) {
-  const auto next = sundials_function<decltype(IDAInit)>("IDAInit");
-  if (!next) return complain("IDAInit", "no SUNDIALS is loaded");
+  const auto next = behind<decltype(IDAInit)>("IDAInit");
+  if (!next) return IDA_ILL_INPUT;
   const int flag = next(ida_mem, res, t0, yy0, yp0);
   if (flag == IDA_SUCCESS) remember_start(ida_mem, yy0);
   return flag;
 }
 
 int IDASetNonlinearSolver(void* ida_mem, SUNNonlinearSolver solver) {
-  const auto next = sundials_function<decltype(IDASetNonlinearSolver)>("IDASetNonlinearSolver");
-  if (!next) return complain("IDASetNonlinearSolver", "no SUNDIALS is loaded");
+  const auto next = behind<decltype(IDASetNonlinearSolver)>("IDASetNonlinearSolver");
+  if (!next) return IDA_ILL_INPUT;
   const int flag = next(ida_mem, solver);
   if (flag == IDA_SUCCESS && ida_mem != ours) {
     const std::lock_guard<std::recursive_mutex> lock(mutex);
@@ -173,16 +190,16 @@ int IDASetNonlinearSolver(void* ida_mem, SUNNonlinearSolver solver) {
 }
 
 int IDACalcIC(void* ida_mem, int icopt, sunrealtype tout1) {
-  const auto next = sundials_function<decltype(IDACalcIC)>("IDACalcIC");
-  if (!next) return complain("IDACalcIC", "no SUNDIALS is loaded");
+  const auto next = behind<decltype(IDACalcIC)>("IDACalcIC");
+  if (!next) return IDA_ILL_INPUT;
   const int flag = prepare(ida_mem);
   return flag == IDA_SUCCESS ? next(ida_mem, icopt, tout1) : flag;
 }
 
 int IDASolve(void* ida_mem, sunrealtype tout, sunrealtype* tret, N_Vector yret, N_Vector ypret,
              int itask) {
-  const auto next = sundials_function<decltype(IDASolve)>("IDASolve");
-  if (!next) return complain("IDASolve", "no SUNDIALS is loaded");
+  const auto next = behind<decltype(IDASolve)>("IDASolve");
+  if (!next) return IDA_ILL_INPUT;
   const int flag = prepare(ida_mem);
   if (flag != IDA_SUCCESS) return flag;
   tether_projection* projection = projection_of_output(ida_mem);
@@ -192,8 +209,8 @@ int IDASolve(void* ida_mem, sunrealtype tout, sunrealtype* tret, N_Vector yret, 
 }
 
 int IDAGetDky(void* ida_mem, sunrealtype t, int k, N_Vector dky) {
-  const auto next = sundials_function<decltype(IDAGetDky)>("IDAGetDky");
-  if (!next) return complain("IDAGetDky", "no SUNDIALS is loaded");
+  const auto next = behind<decltype(IDAGetDky)>("IDAGetDky");
+  if (!next) return IDA_ILL_INPUT;
   const int flag = next(ida_mem, t, k, dky);
   if (flag != IDA_SUCCESS || k != 0) return flag;
   tether_projection* projection = projection_of_output(ida_mem);
@@ -204,7 +221,7 @@ int IDAGetDky(void* ida_mem, sunrealtype t, int k, N_Vector dky) {
 }
 
 void IDAFree(void** ida_mem) {
-  const auto next = sundials_function<decltype(IDAFree)>("IDAFree");
+  const auto next = behind<decltype(IDAFree)>("IDAFree");
   if (!next) return;
   Host host;
   if (ida_mem && *ida_mem) {

@@ -9,10 +9,8 @@
 #include "c/guarded.hpp"
 
 namespace tr = tether::reverse_ida;
-using tether::ida_projection::c::fail;
+using tether::ida_projection::c::Arguments;
 using tether::ida_projection::c::guarded;
-using tether::ida_projection::c::ill;
-using tether::ida_projection::c::null;
 
 struct tether_reverse {
   tr::ReverseIda ida;
@@ -28,14 +26,15 @@ namespace {
 
 template <class Call>
 int request(tether_reverse* reverse, const char* function, Call&& call) {
-  return guarded([&] {
-    if (reverse == nullptr) return null(function, "reverse");
-    try {
-      return static_cast<int>(call(reverse->ida));
-    } catch (const std::logic_error& error) {  // a call out of turn
-      return fail(TETHER_ILL_INPUT, error.what());
-    }
+  return guarded(function, [&](const Arguments& arguments) {
+    arguments.require(reverse, "reverse");
+    return static_cast<int>(call(reverse->ida));
   });
+}
+
+template <class Value>
+Value of(const tether_reverse* reverse, Value (tr::ReverseIda::*value)() const) {
+  return reverse != nullptr ? (reverse->ida.*value)() : Value();
 }
 
 }  // namespace
@@ -47,20 +46,13 @@ tether_reverse* tether_reverse_new_for(int n, double t0, const double* y, const 
                                        int constraints, const tether_options* options,
                                        const tether_sundials_build* host, int* flag) {
   tether_reverse* made = nullptr;
-  const int result = guarded([&] {
-    const char* const function = "tether_reverse_new";
-    if (n < 1) return ill(std::string(function) + ": n = " + std::to_string(n) + ", must be >= 1");
-    if (y == nullptr) return null(function, "y");
-    if (yp == nullptr) return null(function, "yp");
-    if (host == nullptr) return null(function, "host");
-    if (linear < TETHER_LINEAR_DIFFERENCES || linear > TETHER_LINEAR_OWN)
-      return ill(std::string(function) + ": linear = " + std::to_string(linear) +
-                 ", must be TETHER_LINEAR_...");
-    try {
-      tether::ida_projection::check_running_sundials(*host);
-    } catch (const std::runtime_error& error) {
-      return fail(TETHER_WRONG_SUNDIALS, error.what());
-    }
+  const int result = guarded("tether_reverse_new", [&](const Arguments& arguments) {
+    arguments.check(n >= 1, "n", n, ">= 1");
+    arguments.require(y, "y");
+    arguments.require(yp, "yp");
+    arguments.check(linear >= TETHER_LINEAR_DIFFERENCES && linear <= TETHER_LINEAR_OWN, "linear",
+                    linear, "TETHER_LINEAR_...");
+    arguments.check_build(host);
     tr::Equations equations;
     equations.t0 = t0;
     equations.y.assign(y, y + n);
@@ -72,7 +64,6 @@ tether_reverse* tether_reverse_new_for(int n, double t0, const double* y, const 
     equations.constraints = constraints;
     equations.options = tether::ida_projection::options_of(options, n);
     made = new tether_reverse{tr::ReverseIda(std::move(equations)), {}};
-    return 0;
   });
   if (flag != nullptr) *flag = result;
   return made;
@@ -95,41 +86,22 @@ int tether_reverse_go_on(tether_reverse* reverse, int answer) {
                  [&](tr::ReverseIda& ida) { return ida.go_on(answer); });
 }
 
-double tether_reverse_t(const tether_reverse* reverse) { return reverse ? reverse->ida.t() : 0.0; }
-
-double tether_reverse_cj(const tether_reverse* reverse) {
-  return reverse ? reverse->ida.cj() : 0.0;
-}
-
-const double* tether_reverse_y(const tether_reverse* reverse) {
-  return reverse ? reverse->ida.y() : nullptr;
-}
-
-const double* tether_reverse_yp(const tether_reverse* reverse) {
-  return reverse ? reverse->ida.yp() : nullptr;
-}
-
-const double* tether_reverse_rhs(const tether_reverse* reverse) {
-  return reverse ? reverse->ida.rhs() : nullptr;
-}
-
-double* tether_reverse_result(const tether_reverse* reverse) {
-  return reverse ? reverse->ida.result() : nullptr;
-}
+double tether_reverse_t(const tether_reverse* r) { return of(r, &tr::ReverseIda::t); }
+double tether_reverse_cj(const tether_reverse* r) { return of(r, &tr::ReverseIda::cj); }
+const double* tether_reverse_y(const tether_reverse* r) { return of(r, &tr::ReverseIda::y); }
+const double* tether_reverse_yp(const tether_reverse* r) { return of(r, &tr::ReverseIda::yp); }
+const double* tether_reverse_rhs(const tether_reverse* r) { return of(r, &tr::ReverseIda::rhs); }
+double* tether_reverse_result(const tether_reverse* r) { return of(r, &tr::ReverseIda::result); }
+void* tether_reverse_ida_mem(const tether_reverse* r) { return of(r, &tr::ReverseIda::ida_mem); }
 
 const char* tether_reverse_message(tether_reverse* reverse) {
-  const int flag = guarded([&] {
-    if (reverse == nullptr) return null("tether_reverse_message", "reverse");
+  const int flag = guarded("tether_reverse_message", [&](const Arguments& arguments) {
+    arguments.require(reverse, "reverse");
     reverse->message = reverse->ida.message();
-    return 0;
   });
   return flag == 0 ? reverse->message.c_str() : "";
 }
 
 const char* tether_reverse_last_error(void) { return tether::ida_projection::c::last_error; }
-
-void* tether_reverse_ida_mem(const tether_reverse* reverse) {
-  return reverse ? reverse->ida.ida_mem() : nullptr;
-}
 
 }  // extern "C"

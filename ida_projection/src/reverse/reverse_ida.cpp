@@ -1,4 +1,6 @@
 // Tether: IDA by reverse communication. SPDX-License-Identifier: BSD-3-Clause
+#include <boost/context/fiber.hpp>
+#include <boost/context/protected_fixedsize_stack.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -14,8 +16,8 @@
 #include <sunmatrix/sunmatrix_dense.h>
 #include <tether/reverse_ida.hpp>
 
+#include "host/owned_vector.hpp"
 #include "host/shortest.hpp"
-#include "reverse/fiber.hpp"
 
 namespace tether::reverse_ida {
 
@@ -25,19 +27,33 @@ namespace tp = ida_projection;
 
 constexpr std::size_t kStack = std::size_t{1} << 20;
 
-template <class T, void (*Free)(T)>
-struct Release {
-  void operator()(T object) const { Free(object); }
-};
-template <class Pointer, void (*Free)(Pointer)>
-using Owned = std::unique_ptr<std::remove_pointer_t<Pointer>, Release<Pointer, Free>>;
-
 void free_context(SUNContext context) { SUNContext_Free(&context); }
-void free_solver(SUNLinearSolver solver) { SUNLinSolFree(solver); }
 void free_ida(void* mem) { IDAFree(&mem); }
 
-struct FreeIda {
-  void operator()(void* mem) const { free_ida(mem); }
+/// A function on a stack of its own, which can be left and entered again. `body` must not throw and
+/// has to return before the Fiber is destroyed, if it was ever entered: unwinding its stack by an
+/// exception, as Boost would, is not for frames of C.
+class Fiber {
+ public:
+  template <class Body>
+  Fiber(std::size_t stack, Body body)
+      : inside_(std::allocator_arg, boost::context::protected_fixedsize_stack(stack),
+                [this, body = std::move(body)](boost::context::fiber&& caller) mutable {
+                  outside_ = std::move(caller);
+                  body();
+                  return std::move(outside_);
+                }) {}
+  Fiber(const Fiber&) = delete;
+  Fiber& operator=(const Fiber&) = delete;
+
+  /// Runs the body until it leaves or ends.
+  void enter() { inside_ = std::move(inside_).resume(); }
+  /// Called by the body: goes back to where it was entered.
+  void leave() { outside_ = std::move(outside_).resume(); }
+  bool ended() const { return !inside_; }
+
+ private:
+  boost::context::fiber inside_, outside_;
 };
 
 SUNContext new_context() {
@@ -90,25 +106,11 @@ void check(const Equations& e) {
 }  // namespace
 
 const char* to_string(Request request) {
-  switch (request) {
-    case Request::reached:
-      return "reached";
-    case Request::failed:
-      return "failed";
-    case Request::residual:
-      return "residual";
-    case Request::jacobian:
-      return "jacobian";
-    case Request::setup:
-      return "setup";
-    case Request::solve:
-      return "solve";
-    case Request::constraints:
-      return "constraints";
-    case Request::constraint_jacobian:
-      return "constraint_jacobian";
-  }
-  return "unknown";
+  static constexpr const char* kNames[] = {
+      "reached", "failed", "residual",    "jacobian",
+      "setup",   "solve",  "constraints", "constraint_jacobian"};
+  const auto i = static_cast<std::size_t>(request);
+  return i < std::size(kNames) ? kNames[i] : "unknown";
 }
 
 /// IDA and its data, and the fiber in which it runs. A call sets the command, enters the fiber, and
@@ -178,23 +180,33 @@ class ReverseIda::Implementation {
   }
 
   Request go_on(int answer) {
-    if (asked_.request == Request::reached || asked_.request == Request::failed)
-      throw std::logic_error("ReverseIda: go_on() without a request");
+    if (!asked_.open()) throw std::logic_error("ReverseIda: go_on() without a request");
     asked_.answer = answer;
     return resume();
   }
 
-  const Equations& equations() const { return equations_; }
-  Request request() const { return asked_.request; }
+  // The question to the caller, its place, and the answer; or nothing is open.
+  struct Question {
+    Request request = Request::reached;
+    double t = 0.0, cj = 0.0;
+    const double *y = nullptr, *yp = nullptr, *rhs = nullptr;
+    double* result = nullptr;
+    std::size_t result_size = 0;
+    int answer = 0;
+    bool open() const { return request != Request::reached && request != Request::failed; }
+  };
+  // The command that runs in the fiber, and its outcome.
+  struct Task {
+    std::function<void()> command;
+    int flag = 0;
+    std::string message = {};
+    std::exception_ptr thrown = {};
+    bool waiting = false;  // it is done
+  };
+
+  const Question& asked() const { return asked_; }
+  const Task& task() const { return task_; }
   double t() const { return t_; }
-  double cj() const { return asked_.cj; }
-  const double* y() const { return asked_.y; }
-  const double* yp() const { return asked_.yp; }
-  const double* rhs() const { return asked_.rhs; }
-  double* result() const { return asked_.result; }
-  std::size_t result_size() const { return asked_.result_size; }
-  int flag() const { return task_.flag; }
-  const std::string& message() const { return task_.message; }
   void* mem() const { return mem_.get(); }
   const tp::Projection* projection() const { return projection_ ? &*projection_ : nullptr; }
 
@@ -218,7 +230,7 @@ class ReverseIda::Implementation {
       expect(IDASStolerances(mem_.get(), equations_.rtol, equations_.atol[0]), "IDASStolerances");
       return;
     }
-    const Owned<N_Vector, N_VDestroy> atol(vector(equations_.atol));
+    const tp::Owned<N_Vector, N_VDestroy> atol(vector(equations_.atol));
     expect(IDASVtolerances(mem_.get(), equations_.rtol, atol.get()), "IDASVtolerances");
   }
 
@@ -253,53 +265,46 @@ class ReverseIda::Implementation {
     rows.count = equations_.constraints;
     rows.names = equations_.names;
     rows.value = [this](double t, tp::ConstVector y, tp::Vector g) {
-      set_point(t, y.data(), nullptr);
-      return ask(Request::constraints, g.data(), static_cast<std::size_t>(g.size()));
+      return ask(Request::constraints, t, y.data(), nullptr, nullptr, g.data(),
+                 static_cast<std::size_t>(g.size()));
     };
     if (equations_.constraint_jacobian)
       rows.jacobian = tp::DenseJacobian([this](double t, tp::ConstVector y, tp::Matrix C) {
-        set_point(t, y.data(), nullptr);
-        return ask(Request::constraint_jacobian, C.data(), static_cast<std::size_t>(C.size()));
+        return ask(Request::constraint_jacobian, t, y.data(), nullptr, nullptr, C.data(),
+                   static_cast<std::size_t>(C.size()));
       });
     return rows;
   }
 
   static int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
     auto& self = *static_cast<Implementation*>(data);
-    self.set_point(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp));
-    return self.ask(Request::residual, N_VGetArrayPointer(r), self.equations_.y.size());
+    return self.ask(Request::residual, t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), nullptr,
+                    N_VGetArrayPointer(r), self.equations_.y.size());
   }
 
   static int matrix(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
                     void* data, N_Vector, N_Vector, N_Vector) {
     auto& self = *static_cast<Implementation*>(data);
-    self.set_point(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp));
     self.asked_.cj = cj;
-    if (self.equations_.linear == Linear::own) return self.ask(Request::setup, nullptr, 0);
+    const bool own = self.equations_.linear == Linear::own;
     const std::size_t n = self.equations_.y.size();
-    return self.ask(Request::jacobian, SUNDenseMatrix_Data(J), n * n);
+    return self.ask(own ? Request::setup : Request::jacobian, t, N_VGetArrayPointer(y),
+                    N_VGetArrayPointer(yp), nullptr, own ? nullptr : SUNDenseMatrix_Data(J),
+                    own ? 0 : n * n);
   }
 
   static int linear_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
     auto& self = *static_cast<Implementation*>(solver->content);
-    self.asked_.rhs = N_VGetArrayPointer(b);
-    self.asked_.yp = nullptr;
-    return self.ask(Request::solve, N_VGetArrayPointer(x), self.equations_.y.size());
+    const Question& last = self.asked_;
+    return self.ask(Request::solve, last.t, last.y, nullptr, N_VGetArrayPointer(b),
+                    N_VGetArrayPointer(x), self.equations_.y.size());
   }
 
-  void set_point(double t, const double* y, const double* yp) {
-    asked_.t = t;
-    asked_.y = y;
-    asked_.yp = yp;
-    asked_.rhs = nullptr;
-  }
-
-  /// In the fiber: the caller's answer to a request.
-  int ask(Request request, double* result, std::size_t size) {
+  /// In the fiber: the caller's answer to a request. `yp` and `rhs`: null where it has none.
+  int ask(Request request, double t, const double* y, const double* yp, const double* rhs,
+          double* result, std::size_t size) {
     if (abandoned_) return -1;
-    asked_.request = request;
-    asked_.result = result;
-    asked_.result_size = size;
+    asked_ = {request, t, asked_.cj, y, yp, rhs, result, size};
     const double reached = t_;
     t_ = asked_.t;
     fiber_.leave();
@@ -309,13 +314,10 @@ class ReverseIda::Implementation {
 
   template <class Command>
   Request start(Command command) {
-    if (asked_.request != Request::reached && asked_.request != Request::failed)
+    if (asked_.open())
       throw std::logic_error(std::string("ReverseIda: the request \"") + to_string(asked_.request) +
                              "\" is open: answer it by go_on() first");
-    task_.message.clear();
-    task_.flag = 0;
-    task_.thrown = nullptr;
-    task_.command = std::move(command);
+    task_ = Task{std::move(command)};
     return resume();
   }
 
@@ -331,12 +333,7 @@ class ReverseIda::Implementation {
   }
 
   void at_rest(Request request) {
-    asked_.request = request;
-    asked_.y = N_VGetArrayPointer(y_.get());
-    asked_.yp = N_VGetArrayPointer(yp_.get());
-    asked_.rhs = nullptr;
-    asked_.result = nullptr;
-    asked_.result_size = 0;
+    asked_ = {request, t_, asked_.cj, N_VGetArrayPointer(y_.get()), N_VGetArrayPointer(yp_.get())};
   }
 
   /// The body of the fiber; nothing is thrown out of it.
@@ -361,30 +358,12 @@ class ReverseIda::Implementation {
   }
 
   Equations equations_;
-  Owned<SUNContext, free_context> context_;
-  Owned<N_Vector, N_VDestroy> y_, yp_, id_;
-  Owned<SUNMatrix, SUNMatDestroy> matrix_;
-  Owned<SUNLinearSolver, free_solver> solver_;
-  std::unique_ptr<void, FreeIda> mem_;
+  tp::Owned<SUNContext, free_context> context_;
+  tp::Owned<N_Vector, N_VDestroy> y_, yp_, id_;
+  tp::Owned<SUNMatrix, SUNMatDestroy> matrix_;
+  tp::Owned<SUNLinearSolver, SUNLinSolFree> solver_;
+  tp::Owned<void*, free_ida> mem_;
   std::optional<tp::Projection> projection_;
-
-  // The question to the caller, its place, and the answer; or nothing is open.
-  struct Question {
-    Request request = Request::reached;
-    double t = 0.0, cj = 0.0;
-    const double *y = nullptr, *yp = nullptr, *rhs = nullptr;
-    double* result = nullptr;
-    std::size_t result_size = 0;
-    int answer = 0;
-  };
-  // The command that runs in the fiber, and its outcome.
-  struct Task {
-    std::function<void()> command;
-    int flag = 0;
-    std::string message;
-    std::exception_ptr thrown;
-    bool waiting = false;  // it is done
-  };
 
   double t_ = 0.0;
   Question asked_;
@@ -408,16 +387,16 @@ Request ReverseIda::solve(double tout, bool one_step) {
 }
 Request ReverseIda::make_consistent() { return implementation_->make_consistent(); }
 Request ReverseIda::go_on(int answer) { return implementation_->go_on(answer); }
-Request ReverseIda::request() const { return implementation_->request(); }
+Request ReverseIda::request() const { return implementation_->asked().request; }
 double ReverseIda::t() const { return implementation_->t(); }
-double ReverseIda::cj() const { return implementation_->cj(); }
-const double* ReverseIda::y() const { return implementation_->y(); }
-const double* ReverseIda::yp() const { return implementation_->yp(); }
-const double* ReverseIda::rhs() const { return implementation_->rhs(); }
-double* ReverseIda::result() const { return implementation_->result(); }
-std::size_t ReverseIda::result_size() const { return implementation_->result_size(); }
-int ReverseIda::flag() const { return implementation_->flag(); }
-std::string ReverseIda::message() const { return implementation_->message(); }
+double ReverseIda::cj() const { return implementation_->asked().cj; }
+const double* ReverseIda::y() const { return implementation_->asked().y; }
+const double* ReverseIda::yp() const { return implementation_->asked().yp; }
+const double* ReverseIda::rhs() const { return implementation_->asked().rhs; }
+double* ReverseIda::result() const { return implementation_->asked().result; }
+std::size_t ReverseIda::result_size() const { return implementation_->asked().result_size; }
+int ReverseIda::flag() const { return implementation_->task().flag; }
+std::string ReverseIda::message() const { return implementation_->task().message; }
 void* ReverseIda::ida_mem() const { return implementation_->mem(); }
 const ida_projection::Projection* ReverseIda::projection() const {
   return implementation_->projection();

@@ -1,12 +1,15 @@
-// Tether: a SUNLinearSolver for small dense matrices. SPDX-License-Identifier: BSD-3-Clause
+// Tether: fast operations of serial vectors, and a SUNLinearSolver for small dense matrices.
+// SPDX-License-Identifier: BSD-3-Clause
 #include <nvector/nvector_serial.h>
+#include <stdexcept>
+#include <string>
 #include <sundials/sundials_version.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <tether/ida_projection/fast.hpp>
 #include <tether/linalg/small_lu.hpp>
 
-#include "arguments.hpp"
+#include "fast/kernels.hpp"
 
 namespace tether::ida_projection {
 
@@ -70,26 +73,52 @@ int destroy(SUNLinearSolver solver) {
   return kSuccess;
 }
 
+[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
+
+/// `name` says whose argument it is.
+void require_serial(N_Vector v, const std::string& name) {
+  if (!v) refuse(name + " is null; want a vector of N_VNew_Serial or N_VMake_Serial");
+  const N_Vector_ID id =
+      v->ops && v->ops->nvgetvectorid ? v->ops->nvgetvectorid(v) : SUNDIALS_NVEC_CUSTOM;
+  if (id != SUNDIALS_NVEC_SERIAL || !v->content)
+    refuse(name + " is not a serial vector (N_VGetVectorID gives " + std::to_string(id) +
+           "); want one of N_VNew_Serial or N_VMake_Serial, others keep their own operations");
+}
+
 std::string size_of(SUNMatrix A) {
   return std::to_string(SM_ROWS_D(A)) + " x " + std::to_string(SM_COLUMNS_D(A));
 }
 
 void require_small_dense(N_Vector y, SUNMatrix A) {
-  fast::require_serial(y, "fast_dense_solver: y");
-  if (!A) fast::refuse("fast_dense_solver: A is null; want a matrix of SUNDenseMatrix");
+  require_serial(y, "fast_dense_solver: y");
+  if (!A) refuse("fast_dense_solver: A is null; want a matrix of SUNDenseMatrix");
   if (!A->ops || !A->ops->getid || A->ops->getid(A) != SUNMATRIX_DENSE)
-    fast::refuse("fast_dense_solver: A is not a dense matrix; want one of SUNDenseMatrix");
+    refuse("fast_dense_solver: A is not a dense matrix; want one of SUNDenseMatrix");
   if (SM_ROWS_D(A) != SM_COLUMNS_D(A))
-    fast::refuse("fast_dense_solver: A is " + size_of(A) + "; want a square matrix");
+    refuse("fast_dense_solver: A is " + size_of(A) + "; want a square matrix");
   if (SM_ROWS_D(A) != NV_LENGTH_S(y))
-    fast::refuse("fast_dense_solver: A is " + size_of(A) + ", but y has " +
-                 std::to_string(NV_LENGTH_S(y)) + " elements; want as many");
+    refuse("fast_dense_solver: A is " + size_of(A) + ", but y has " +
+           std::to_string(NV_LENGTH_S(y)) + " elements; want as many");
   if (SM_ROWS_D(A) < 1 || SM_ROWS_D(A) > kLargestFastDense)
-    fast::refuse("fast_dense_solver: A is " + size_of(A) + "; want 1 to " +
-                 std::to_string(kLargestFastDense) + " rows (SUNLinSol_Dense takes any number)");
+    refuse("fast_dense_solver: A is " + size_of(A) + "; want 1 to " +
+           std::to_string(kLargestFastDense) + " rows (SUNLinSol_Dense takes any number)");
 }
 
 }  // namespace
+
+N_Vector fast_vector(N_Vector y) {
+  check_running_sundials(TETHER_SUNDIALS_BUILD);
+  require_serial(y, "fast_vector: y");
+  check_running_indices(y);
+  fast::install_kernels(y->ops, NV_LENGTH_S(y), false);
+  return y;
+}
+
+void fast_vector(N_Vector y, N_Vector yp) {
+  require_serial(yp, "fast_vector: yp");
+  fast_vector(y);
+  fast_vector(yp);
+}
 
 SUNLinearSolver fast_dense_solver(N_Vector y, SUNMatrix A) {
   check_running_sundials(TETHER_SUNDIALS_BUILD);
