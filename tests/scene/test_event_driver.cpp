@@ -20,7 +20,7 @@ namespace {
 /// A slider with clearance (Flores): its corners hit in turns, hundreds of times in one instant.
 struct Clearance {
   Scene scene;
-  tether::scene::smooth::Units units = tether::scene::event::units_of(scene);
+  tether::scene::Units units = tether::scene::event::units_of(scene);
   Scene in_units = tether::scene::event::scaled(scene, units);
   SceneModel model{in_units, units.time};
   double end = scene.end / units.time;

@@ -293,52 +293,20 @@ constexpr std::size_t kMostPoints = 1000;
 
 class CableEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "cable", [&](files::Fields& in) {
-      Spring spring;
-      spring.place = in.place();
-      spring.name = files::read_name(in, "cable");
-      Cable& cable = spring.cable.emplace();
-      const std::vector<int> bodies = r.several_bodies(
-          in, 2, kMostPoints, "names of bodies, one for each point; \"world\" is the ground");
-      if (!in.has("at")) in.missing("at", "points from end to end, world, m");
-      const std::vector<Vector3d> points = in.points("at", 2, kMostPoints);
-      if (!in.has("stiffness")) in.missing("stiffness", "a number > 0 (N/m)");
-      spring.stiffness = in.number("stiffness", 1, files::kPositive, "N/m");
-      spring.damping = in.number("damping", spring.damping, files::kNotNegative, "N s/m");
-      if (in.has("length")) spring.rest = in.number("length", 1, files::kPositive, "m");
-      cable.winch = in.number("winch", cable.winch, files::kAny, "m/s");
-      if (bodies.empty() || points.empty()) return;
-      if (bodies.size() != points.size())
-        return in.wrong("at",
-                        fmt::format("must be {} points, one for each of bodies", bodies.size()));
-      spring.first = bodies.front();
-      spring.at = points.front();
-      spring.second = bodies.back();
-      spring.at_second = points.back();
-      for (std::size_t k = 1; k + 1 < points.size(); ++k)
-        cable.rings.push_back({bodies[k], points[k]});
-      r.scene.springs.push_back(std::move(spring));
-    });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const Spring& spring : scene.springs) {
-      if (!spring.cable) continue;
-      out.item("cable");
-      out.field("name", spring.name);
-      std::vector<int> bodies;
-      std::vector<Vector3d> points;
-      for (const Ring& each : cable_points(spring)) {
-        bodies.push_back(each.body);
-        points.push_back(each.at);
-      }
-      out.raw("bodies", files::names(scene, bodies));
-      out.raw("at", files::toml(points), "m");
-      out.field("stiffness", spring.stiffness, "N/m");
-      out.field("damping", spring.damping, "N s/m");
-      if (spring.rest) out.field("length", *spring.rest, "m");
-      out.field("winch", spring.cable->winch, "m/s");
-    }
+  void fields(const files::Form& root, Scene& scene) const override {
+    const auto one = [](const files::Form& form, Spring& spring) {
+      if (form.in()) spring.cable.emplace();
+      form.name("cable", spring.name);
+      const bool whole = places(form, spring);
+      form.require("stiffness", "a number > 0 (N/m)");
+      form.number("stiffness", spring.stiffness, files::kPositive, kStiffness);
+      form.number("damping", spring.damping, files::kNotNegative, kDamping);
+      form.number("length", spring.rest, files::kPositive, kMetres);
+      form.number("winch", spring.cable->winch, files::kAny, kSpeed);
+      return whole;
+    };
+    root.each("cable", scene.springs, one,
+              [](const Spring& each) { return each.cable.has_value(); });
   }
   void check(const Scene& scene, files::Report& report) const override {
     std::set<std::string> names;
@@ -393,13 +361,6 @@ class CableEffect : public Effect {
     for (const Spring& spring : scene.springs)
       if (spring.cable) rate.take(std::abs(spring.cable->winch) / length);
   }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Spring& spring : scene.springs) {
-      if (!spring.cable) continue;
-      for (Ring& ring : spring.cable->rings) ring.at /= units.length;
-      spring.cable->winch /= units.speed();
-    }
-  }
   // Several points of the world pull in directions that change: no axis is left.
   void limit_momenta(Momenta& momenta) const override {
     for (const Spring& spring : momenta.scene.springs) {
@@ -423,6 +384,49 @@ class CableEffect : public Effect {
     const bool any =
         any_of(scene.springs, [](const Spring& each) { return each.cable.has_value(); });
     return any ? std::make_unique<CableForces>(scene, bodies) : nullptr;
+  }
+
+ private:
+  /// The points and their bodies, from end to end; false: they are missing or wrong.
+  static bool places(const files::Form& form, Spring& spring) {
+    if (form.in()) return read_places(*form.in(), *form.reader(), spring);
+    std::vector<int> bodies;
+    std::vector<Vector3d> points;
+    for (const Ring& each : cable_points(spring)) {
+      bodies.push_back(each.body);
+      points.push_back(each.at);
+    }
+    if (form.out()) {
+      form.out()->raw("bodies", files::names(form.scene(), bodies));
+      form.out()->raw("at", files::toml(points), "m");
+    } else {
+      for (Vector3d& each : points) each /= form.units()->length;
+      put_places(bodies, points, spring);
+    }
+    return true;
+  }
+  static bool read_places(files::Fields& in, const files::Reader& r, Spring& spring) {
+    const std::vector<int> bodies = r.several_bodies(
+        in, 2, kMostPoints, "names of bodies, one for each point; \"world\" is the ground");
+    if (!in.has("at")) in.missing("at", "points from end to end, world, m");
+    const std::vector<Vector3d> points = in.points("at", 2, kMostPoints);
+    if (bodies.empty() || points.empty()) return false;
+    if (bodies.size() == points.size()) {
+      put_places(bodies, points, spring);
+      return true;
+    }
+    in.wrong("at", fmt::format("must be {} points, one for each of bodies", bodies.size()));
+    return false;
+  }
+  static void put_places(const std::vector<int>& bodies, const std::vector<Vector3d>& points,
+                         Spring& spring) {
+    spring.first = bodies.front();
+    spring.at = points.front();
+    spring.second = bodies.back();
+    spring.at_second = points.back();
+    spring.cable->rings.clear();
+    for (std::size_t k = 1; k + 1 < points.size(); ++k)
+      spring.cable->rings.push_back({bodies[k], points[k]});
   }
 };
 

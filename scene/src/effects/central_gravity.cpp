@@ -71,26 +71,16 @@ class CentralGravityForce : public Force {
 
 class CentralGravityEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "central_gravity", [&](files::Fields& in) {
-      CentralGravity centre;
-      centre.place = in.place();
-      centre.at = in.vector("at", centre.at, files::kAny, "m");
-      if (!in.has("gravitational_parameter"))
-        in.missing("gravitational_parameter", "G times the mass of the centre, m^3/s^2");
-      centre.gravitational_parameter =
-          in.number("gravitational_parameter", 0, files::kNotNegative, "m^3/s^2");
-      centre.gradient = in.flag("gradient", centre.gradient);
-      r.scene.central_gravity.push_back(centre);
-    });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const CentralGravity& centre : scene.central_gravity) {
-      out.item("central_gravity");
-      out.field("at", centre.at, "m");
-      out.field("gravitational_parameter", centre.gravitational_parameter, "m^3/s^2");
-      out.field("gradient", centre.gradient);
-    }
+  void fields(const files::Form& root, Scene& scene) const override {
+    root.each("central_gravity", scene.central_gravity,
+              [](const files::Form& form, CentralGravity& centre) {
+                form.vector("at", centre.at, kMetres);
+                form.require("gravitational_parameter", "G times the mass of the centre, m^3/s^2");
+                form.number("gravitational_parameter", centre.gravitational_parameter,
+                            files::kNotNegative, {"m^3/s^2", 0, 3, -2});
+                form.flag("gradient", centre.gradient);
+                return true;
+              });
   }
   void check(const Scene& scene, files::Report& report) const override {
     for (const CentralGravity& centre : scene.central_gravity)
@@ -113,13 +103,6 @@ class CentralGravityEffect : public Effect {
     each(scene, [&](double distance, double parameter) {
       rate.take(std::sqrt(parameter / (distance * distance * distance)));
     });
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (CentralGravity& centre : scene.central_gravity) {
-      centre.at /= units.length;
-      centre.gravitational_parameter /=
-          units.length * units.length * units.length / (units.time * units.time);
-    }
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const CentralGravity& centre : momenta.scene.central_gravity) {

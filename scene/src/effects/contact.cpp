@@ -16,29 +16,33 @@ using Materials = std::pair<std::string, std::string>;
 
 Materials ordered(const std::string& a, const std::string& b) { return std::minmax(a, b); }
 
+void read_pair(files::Fields& in, const files::Reader& r, Pair& pair) {
+  constexpr const char* kAllowed = "two names of materials, e.g. [\"card\", \"table\"]";
+  using Kind = files::Value::Kind;
+  const files::Value* between = in.find("between");
+  if (between == nullptr) return in.missing("between", kAllowed);
+  if (between->kind() != Kind::array || between->items().size() != 2 ||
+      between->items()[0].kind() != Kind::text || between->items()[1].kind() != Kind::text)
+    return in.wrong("between", std::string("must be ") + kAllowed);
+  pair.first = between->items()[0].text();
+  pair.second = between->items()[1].text();
+  for (const std::string& name : {pair.first, pair.second})
+    if (r.materials.count(name) == 0)
+      return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
+                                             r.hint_of(name, r.materials)));
+  pair.touch = in.flag("touch", pair.touch);
+  for (const char* key : {"friction", "restitution"})
+    if (!pair.touch && in.has(key)) in.wrong(key, "is of a contact, and touch = false has none");
+}
+
 class ContactEffect : public Effect {
  public:
-  void read_pair(files::Fields& in, files::Reader& r, Pair& pair) const override {
-    constexpr const char* kAllowed = "two names of materials, e.g. [\"card\", \"table\"]";
-    using Kind = files::Value::Kind;
-    const files::Value* between = in.find("between");
-    if (between == nullptr) return in.missing("between", kAllowed);
-    if (between->kind() != Kind::array || between->items().size() != 2 ||
-        between->items()[0].kind() != Kind::text || between->items()[1].kind() != Kind::text)
-      return in.wrong("between", std::string("must be ") + kAllowed);
-    pair.first = between->items()[0].text();
-    pair.second = between->items()[1].text();
-    for (const std::string& name : {pair.first, pair.second})
-      if (r.materials.count(name) == 0)
-        return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
-                                               r.hint_of(name, r.materials)));
-    pair.touch = in.flag("touch", pair.touch);
-    for (const char* key : {"friction", "restitution"})
-      if (!pair.touch && in.has(key)) in.wrong(key, "is of a contact, and touch = false has none");
-  }
-  void write_pair(const Pair& pair, files::Writer& out) const override {
-    out.raw("between", fmt::format("[{}, {}]", files::toml(pair.first), files::toml(pair.second)));
-    if (!pair.touch) out.field("touch", pair.touch);
+  void pair_fields(const files::Form& form, Pair& pair) const override {
+    if (form.in()) return read_pair(*form.in(), *form.reader(), pair);
+    if (!form.out()) return;
+    form.out()->raw("between",
+                    fmt::format("[{}, {}]", files::toml(pair.first), files::toml(pair.second)));
+    if (!pair.touch) form.flag("touch", pair.touch);
   }
   void check(const Scene& scene, files::Report& report) const override;
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {

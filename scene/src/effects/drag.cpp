@@ -105,11 +105,8 @@ class DragForce : public Force {
 
 class DragEffect : public Effect {
  public:
-  void read_scene(files::Fields& in, Scene& scene) const override {
-    if (in.has("wind")) scene.wind = in.vector("wind", Vector3d::Zero(), files::kAny, "m/s");
-  }
-  void write_scene(const Scene& scene, files::Writer& out) const override {
-    if (scene.wind) out.field("wind", *scene.wind, "m/s");
+  void scene_fields(const files::Form& form, Scene& scene) const override {
+    form.vector("wind", scene.wind, kSpeed);
   }
   void check(const Scene& scene, files::Report& report) const override {
     if (scene.wind && !does_work(scene))
@@ -118,22 +115,12 @@ class DragEffect : public Effect {
   void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
     if (scene.wind) rate.take(scene.wind->norm() / length);
   }
-  void read_body(files::Fields& in, files::Reader& r, Body& body) const override {
-    const files::Value* table = in.table("drag");
-    if (table == nullptr) return;
-    files::Fields fields = r.fields(table, in.path() + ": drag");
-    Drag drag;
-    drag.linear = fields.number("linear", drag.linear, files::kNotNegative, "N s/m");
-    drag.quadratic = fields.number("quadratic", drag.quadratic, files::kNotNegative, "N s^2/m^2");
-    drag.rotational = fields.number("rotational", drag.rotational, files::kNotNegative, "N m s");
-    fields.finish();
-    body.drag = drag;
-  }
-  void write_body(const Body& body, files::Writer& out) const override {
-    if (body.drag)
-      out.raw("drag", fmt::format("{{ linear = {}, quadratic = {}, rotational = {} }}",
-                                  files::toml(body.drag->linear), files::toml(body.drag->quadratic),
-                                  files::toml(body.drag->rotational)));
+  void body_fields(const files::Form& form, Body& body) const override {
+    form.table("drag", body.drag, [](const files::Form& in, Drag& drag) {
+      in.number("linear", drag.linear, files::kNotNegative, kDamping);
+      in.number("quadratic", drag.quadratic, files::kNotNegative, {"N s^2/m^2", 1, -1, 0});
+      in.number("rotational", drag.rotational, files::kNotNegative, {"N m s", 1, 2, -1});
+    });
   }
   void check_body(const Body& body, files::Report& report) const override {
     if (body.fixed && body.drag)
@@ -146,15 +133,6 @@ class DragEffect : public Effect {
     if (count > 0)
       lines.push_back({"drag", fmt::format("{} {}{}", count, count == 1 ? "body" : "bodies",
                                            scene.wind ? ", in a wind" : "")});
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    if (scene.wind) *scene.wind /= units.speed();
-    for (Body& body : scene.bodies) {
-      if (!body.drag) continue;
-      body.drag->linear /= units.force() / units.speed();
-      body.drag->quadratic /= units.mass / units.length;
-      body.drag->rotational /= units.inertia() / units.time;
-    }
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Dragged& each : dragged(momenta.scene)) {

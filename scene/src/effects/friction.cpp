@@ -13,11 +13,8 @@ namespace {
 
 class FrictionEffect : public Effect {
  public:
-  void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
-    pair.friction = read_coefficient(in, "friction", pair.friction, "");
-  }
-  void write_pair(const Pair& pair, files::Writer& out) const override {
-    if (pair.touch) out.field("friction", pair.friction);
+  void pair_fields(const files::Form& form, Pair& pair) const override {
+    if (form.in() || pair.touch) coefficient(form, "friction", pair.friction, {});
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;

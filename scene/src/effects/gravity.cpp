@@ -44,12 +44,8 @@ class GravityForce : public Force {
 
 class Gravity : public Effect {
  public:
-  void read_scene(files::Fields& in, Scene& scene) const override {
-    if (in.has("gravity"))
-      scene.gravity = in.vector("gravity", Vector3d::Zero(), files::kAny, "m/s^2");
-  }
-  void write_scene(const Scene& scene, files::Writer& out) const override {
-    if (scene.gravity) out.field("gravity", *scene.gravity, "m/s^2");
+  void scene_fields(const files::Form& form, Scene& scene) const override {
+    form.vector("gravity", scene.gravity, kAcceleration);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     if (!scene.gravity) return;
@@ -58,9 +54,6 @@ class Gravity : public Effect {
   }
   void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
     if (scene.gravity) rate.take(std::sqrt(scene.gravity->norm() / length));
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    if (scene.gravity) *scene.gravity /= units.acceleration();
   }
   void limit_momenta(Momenta& momenta) const override {
     const Scene& scene = momenta.scene;

@@ -12,22 +12,13 @@ namespace {
 
 class InvariantEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "invariant", [&](files::Fields& in) {
-      Invariant invariant;
-      invariant.place = in.place();
-      if (!in.has("kind")) in.missing("kind", "energy, momentum or angular_momentum");
-      invariant.kind = in.word("kind", invariant.kind);
-      invariant.project = in.flag("project", invariant.project);
-      r.scene.invariants.push_back(invariant);
+  void fields(const files::Form& root, Scene& scene) const override {
+    root.each("invariant", scene.invariants, [](const files::Form& form, Invariant& invariant) {
+      form.require("kind", "energy, momentum or angular_momentum");
+      form.word("kind", invariant.kind);
+      form.flag("project", invariant.project);
+      return true;
     });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const Invariant& each : scene.invariants) {
-      out.item("invariant");
-      out.raw("kind", files::toml_word(each.kind));
-      out.field("project", each.project);
-    }
   }
   void check(const Scene& scene, files::Report& report) const override {
     std::set<InvariantKind> kinds;

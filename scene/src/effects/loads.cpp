@@ -117,68 +117,50 @@ class LoadForce : public Force {
   std::vector<Load> loads_;  // on bodies that move
 };
 
-void read_table(files::Fields& in, LoadHistory& history) {
-  for (const auto& [time, factor] : in.pairs("table", kMostListed))
-    history.table.push_back({time, factor});
+void read_table(files::Fields& in, std::optional<LoadHistory>& history) {
+  std::vector<Knot> table;
+  for (const auto& [time, factor] : in.pairs("table", kMostListed)) table.push_back({time, factor});
   const auto earlier = [](const Knot& a, const Knot& b) { return a.time < b.time; };
-  if (!history.table.empty() && std::is_sorted(history.table.begin(), history.table.end(), earlier))
-    return;
-  history.table.clear();
-  in.wrong("table", fmt::format("must be an array of up to {} [time (s), factor], no time before "
-                                "the one above it",
-                                kMostListed));
+  if (!table.empty() && std::is_sorted(table.begin(), table.end(), earlier))
+    history.emplace().table = std::move(table);
+  else
+    in.wrong("table", fmt::format("must be an array of up to {} [time (s), factor], no time before "
+                                  "the one above it",
+                                  kMostListed));
 }
 
-void read_sine(files::Reader& r, files::Fields& in, LoadHistory& history) {
-  files::Fields sine = r.fields(in.table("sine"), in.field("sine"));
-  history.mean = sine.number("mean", history.mean, files::kAny, "part of the load");
-  history.frequency = sine.number("frequency", history.frequency, files::kNotNegative, "Hz");
-  history.phase = sine.angle("phase_", history.phase);
-  sine.finish();
+void history_fields(const files::Form& form, std::optional<LoadHistory>& history) {
+  if (files::Fields* in = form.in(); in && in->has("table")) {
+    if (in->has("sine")) return in->wrong("table", "give sine or table, not both");
+    return read_table(*in, history);
+  }
+  if (!history || history->table.empty())
+    return form.table("sine", history, [](const files::Form& sine, LoadHistory& h) {
+      sine.number("mean", h.mean, files::kAny, "part of the load");
+      sine.number("frequency", h.frequency, files::kNotNegative, kHertz);
+      sine.angle("phase_", h.phase);
+    });
+  std::vector<std::array<double, 2>> rows;
+  for (Knot& knot : history->table) {
+    if (form.units()) knot.time /= form.units()->time;
+    rows.push_back({knot.time, knot.factor});
+  }
+  if (form.out()) form.out()->field("table", rows);
 }
 
 class LoadEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "load", [&](files::Fields& in) {
-      Load load;
-      load.place = in.place();
-      load.body = r.body(in, "body");
-      load.force = in.vector("force", load.force, files::kAny, "N");
-      load.torque = in.vector("torque", load.torque, files::kAny, "N m");
-      if (!in.has("force") && !in.has("torque"))
-        in.missing("force", "give force (N), torque (N m) or both");
-      load.in_body = in.choice("axes", {"world", "body"}) == 1;
-      if (in.has("sine") && in.has("table")) {
-        in.wrong("table", "give sine or table, not both");
-      } else if (in.has("sine")) {
-        read_sine(r, in, load.history.emplace());
-      } else if (in.has("table")) {
-        read_table(in, load.history.emplace());
-        if (load.history->table.empty()) load.history.reset();
-      }
-      r.scene.loads.push_back(load);
+  void fields(const files::Form& root, Scene& scene) const override {
+    root.each("load", scene.loads, [](const files::Form& form, Load& load) {
+      form.body("body", load.body);
+      form.vector("force", load.force, kForce);
+      form.vector("torque", load.torque, kMoment);
+      form.require_one("force", "torque", "give force (N), torque (N m) or both");
+      if (form.in()) load.in_body = form.in()->choice("axes", {"world", "body"}) == 1;
+      if (form.out()) form.out()->field("axes", std::string(load.in_body ? "body" : "world"));
+      history_fields(form, load.history);
+      return true;
     });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const Load& load : scene.loads) {
-      out.item("load");
-      out.field("body", scene.bodies[at(load.body)].name);
-      out.field("force", load.force, "N");
-      out.field("torque", load.torque, "N m");
-      out.field("axes", std::string(load.in_body ? "body" : "world"));
-      if (load.history) write_history(*load.history, out);
-    }
-  }
-  static void write_history(const LoadHistory& history, files::Writer& out) {
-    using files::toml;
-    if (history.table.empty())
-      return out.raw(
-          "sine", fmt::format("{{ mean = {}, frequency = {}, phase_rad = {} }}", toml(history.mean),
-                              toml(history.frequency), toml(history.phase)));
-    std::vector<std::array<double, 2>> rows;
-    for (const Knot& knot : history.table) rows.push_back({knot.time, knot.factor});
-    out.raw("table", toml(rows));
   }
   void check(const Scene& scene, files::Report& report) const override {
     for (const Load& load : scene.loads)
@@ -214,15 +196,6 @@ class LoadEffect : public Effect {
     for (const Load& load : scene.loads)
       if (load.history)
         for (const Knot& knot : load.history->table) times.push_back(knot.time);
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Load& load : scene.loads) {
-      load.force /= units.force();
-      load.torque /= units.energy();
-      if (!load.history) continue;
-      load.history->frequency *= units.time;
-      for (Knot& knot : load.history->table) knot.time /= units.time;
-    }
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Load& load : momenta.scene.loads) {

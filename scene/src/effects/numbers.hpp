@@ -5,8 +5,7 @@
 
 #include <cmath>
 
-#include "toml/fields.hpp"
-#include "toml/report.hpp"
+#include "toml/form.hpp"
 
 namespace tether::scene::effects {
 
@@ -14,13 +13,11 @@ namespace tether::scene::effects {
 constexpr double kLargestMotion = 1e150;
 
 /// A coefficient of friction that is 0, or by which impulses can be divided and multiplied.
-inline double read_coefficient(files::Fields& in, const char* key, double otherwise,
-                               const char* unit) {
-  const double value = in.number(key, otherwise, files::kNotNegative, unit);
-  if (value == 0 || (value >= 1 / kLargestMotion && value <= kLargestMotion)) return value;
-  in.wrong(key, fmt::format("must be 0 or a number from {:g} to {:g}", 1 / kLargestMotion,
-                            kLargestMotion));
-  return otherwise;
+inline void coefficient(const files::Form& form, const char* key, double& x, const Unit& unit) {
+  form.number(key, x, files::kNotNegative, unit);
+  if (!form.in() || x == 0 || (x >= 1 / kLargestMotion && x <= kLargestMotion)) return;
+  form.in()->wrong(key, fmt::format("must be 0 or a number from {:g} to {:g}", 1 / kLargestMotion,
+                                    kLargestMotion));
 }
 
 /// "0.3", or "0.1 to 0.5" where the pairs that touch differ; there must be one.

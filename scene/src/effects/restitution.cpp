@@ -14,11 +14,8 @@ namespace {
 
 class RestitutionEffect : public Effect {
  public:
-  void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
-    pair.restitution = in.number("restitution", pair.restitution, files::kPart, "");
-  }
-  void write_pair(const Pair& pair, files::Writer& out) const override {
-    if (pair.touch) out.field("restitution", pair.restitution);
+  void pair_fields(const files::Form& form, Pair& pair) const override {
+    if (form.in() || pair.touch) form.number("restitution", pair.restitution, files::kPart);
   }
   void plan(const Scene& scene, EngineKind kind, std::vector<PlannedEffect>& lines) const override {
     const bool limits =

@@ -14,13 +14,9 @@ namespace {
 
 class RollingFrictionEffect : public Effect {
  public:
-  void read_pair(files::Fields& in, files::Reader&, Pair& pair) const override {
-    pair.rolling = read_coefficient(in, "rolling", pair.rolling, "m");
-    pair.torsional = read_coefficient(in, "torsional", pair.torsional, "m");
-  }
-  void write_pair(const Pair& pair, files::Writer& out) const override {
-    if (pair.rolling > 0) out.field("rolling", pair.rolling, "m");
-    if (pair.torsional > 0) out.field("torsional", pair.torsional, "m");
+  void pair_fields(const files::Form& form, Pair& pair) const override {
+    coefficient(form, "rolling", pair.rolling, kMetres);
+    coefficient(form, "torsional", pair.torsional, kMetres);
   }
   void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
     const auto any = [&](double Pair::*value) {

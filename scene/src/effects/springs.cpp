@@ -131,32 +131,21 @@ bool pulls(const Spring& spring) { return spring.stiffness > 0 || !damps(spring)
 
 class SpringEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "spring", [&](files::Fields& in) {
-      Spring spring;
-      spring.place = in.place();
-      spring.name = files::read_name(in, "spring");
-      r.two_bodies(in, spring.first, spring.second);
-      files::read_two_points(in, spring.at, spring.at_second);
-      spring.stiffness = in.number("stiffness", spring.stiffness, files::kNotNegative, "N/m");
-      spring.damping = in.number("damping", spring.damping, files::kNotNegative, "N s/m");
-      if (in.has("rest")) spring.rest = in.number("rest", 0, files::kNotNegative, "m");
-      if (!in.has("stiffness") && !in.has("damping"))
-        in.missing("stiffness", "give stiffness (N/m), damping (N s/m) or both");
-      r.scene.springs.push_back(std::move(spring));
-    });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const Spring& spring : scene.springs) {
-      if (spring.cable) continue;
-      out.item("spring");
-      out.field("name", spring.name);
-      out.raw("bodies", files::two_names(scene, spring.first, spring.second));
-      out.raw("at", files::toml(std::vector<Vector3d>{spring.at, spring.at_second}), "m");
-      out.field("stiffness", spring.stiffness, "N/m");
-      out.field("damping", spring.damping, "N s/m");
-      if (spring.rest) out.field("rest", *spring.rest, "m");
-    }
+  void fields(const files::Form& root, Scene& scene) const override {
+    const auto is_spring = [](const Spring& each) { return !each.cable; };
+    root.each(
+        "spring", scene.springs,
+        [](const files::Form& form, Spring& spring) {
+          form.name("spring", spring.name);
+          form.bodies(spring.first, spring.second);
+          form.points(spring.at, spring.at_second);
+          form.number("stiffness", spring.stiffness, files::kNotNegative, kStiffness);
+          form.number("damping", spring.damping, files::kNotNegative, kDamping);
+          form.number("rest", spring.rest, files::kNotNegative, kMetres);
+          form.require_one("stiffness", "damping", "give stiffness (N/m), damping (N s/m) or both");
+          return true;
+        },
+        is_spring);
   }
   void check(const Scene& scene, files::Report& report) const override {
     std::vector<Spring> springs;
@@ -190,15 +179,6 @@ class SpringEffect : public Effect {
   }
   void take_rates(const Scene& scene, double, double mass, Largest& rate) const override {
     for (const Spring& spring : scene.springs) rate.take(std::sqrt(spring.stiffness / mass));
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Spring& spring : scene.springs) {
-      spring.at /= units.length;
-      spring.at_second /= units.length;
-      spring.stiffness /= units.stiffness();
-      spring.damping /= units.stiffness() * units.time;
-      if (spring.rest) *spring.rest /= units.length;
-    }
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Spring& spring : momenta.scene.springs) {

@@ -13,27 +13,13 @@ namespace {
 
 class SurfaceSpeedEffect : public Effect {
  public:
-  void read_body(files::Fields& in, files::Reader& r, Body& body) const override {
-    const files::Value* table = in.table("surface");
-    if (table == nullptr) return;
-    files::Fields fields = r.fields(table, in.path() + ": surface");
-    SurfaceSpeed& speed = body.surface.emplace();
-    speed.velocity = fields.vector("velocity", speed.velocity, files::kAny, "m/s");
-    speed.angular_velocity =
-        fields.vector("angular_velocity", speed.angular_velocity, files::kAny, "rad/s");
-    if (!fields.has("velocity") && !fields.has("angular_velocity"))
-      fields.missing("velocity", "give velocity (m/s), angular_velocity (rad/s) or both");
-    fields.finish();
-  }
-  void write_body(const Body& body, files::Writer& out) const override {
-    if (!body.surface) return;
-    const auto list = [](const Vector3d& v) {
-      return fmt::format("[{}, {}, {}]", files::toml(v.x()), files::toml(v.y()),
-                         files::toml(v.z()));
-    };
-    out.raw("surface",
-            fmt::format("{{ velocity = {}, angular_velocity = {} }}", list(body.surface->velocity),
-                        list(body.surface->angular_velocity)));
+  void body_fields(const files::Form& form, Body& body) const override {
+    form.table("surface", body.surface, [](const files::Form& in, SurfaceSpeed& speed) {
+      in.vector("velocity", speed.velocity, kSpeed);
+      in.vector("angular_velocity", speed.angular_velocity, kTurning);
+      in.require_one("velocity", "angular_velocity",
+                     "give velocity (m/s), angular_velocity (rad/s) or both");
+    });
   }
   void check_body(const Body& body, files::Report& report) const override {
     if (body.surface && body.material.empty())
@@ -52,13 +38,6 @@ class SurfaceSpeedEffect : public Effect {
       if (!body.surface) continue;
       rate.take(body.surface->velocity.norm() / length);
       rate.take(body.surface->angular_velocity.norm());
-    }
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Body& body : scene.bodies) {
-      if (!body.surface) continue;
-      body.surface->velocity /= units.speed();
-      body.surface->angular_velocity *= units.time;
     }
   }
 };

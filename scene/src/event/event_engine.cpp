@@ -101,7 +101,7 @@ class EventEngine : public ResumableEngine {
     if (far()) place += units_.length * origin_;
   }
 
-  smooth::Units units_;
+  Units units_;
   Vector3d origin_;
   Scene scene_;  // in these units and from this origin, as everything here but the results
   DriverOptions options_;
@@ -288,7 +288,7 @@ void EventEngine::exchange(binary::Archive& io, Driver::Memory& m, double& reach
                            VectorXd& now) const {
   const auto contacts = at(model_->contacts());
   std::uint64_t size = at(static_cast<int>(now_.size())), count = contacts;
-  smooth::Units units = units_;
+  Units units = units_;
   io(size, count, units.length, units.time, units.mass, m.time, reached, m.kept_energy,
      m.at_one_time, m.events, m.impacts);
   if (units.length != units_.length || units.time != units_.time || units.mass != units_.mass ||

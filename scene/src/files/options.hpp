@@ -1,18 +1,13 @@
 // Tether: the fields of [smooth], [stepping] and [event]. SPDX-License-Identifier: BSD-3-Clause
-//
-// Each is named once, for the reader and the writer: `io` takes a number with its range and what it
-// is, a whole number between two others, a flag, or a word.
 #pragma once
 
-#include "toml/fields.hpp"
-#include "toml/writer.hpp"
+#include "toml/form.hpp"
 
 namespace tether::scene::files {
 
 constexpr int kMostCounted = 2000000000;
 
-template <class Io>
-void each_field(SmoothOptions& o, Io&& io) {
+inline void each_field(SmoothOptions& o, const Form& io) {
   io.number("tolerance", o.tolerance, {1e-14, 1e-1, false, "a number from 1e-14 to 0.1"},
             "relative, and absolute in SI");
   io.word("formulation", o.formulation);
@@ -21,8 +16,7 @@ void each_field(SmoothOptions& o, Io&& io) {
   io.count("max_steps", o.max_steps, 1, kMostCounted);
 }
 
-template <class Io>
-void each_field(EventOptions& o, Io&& io) {
+inline void each_field(EventOptions& o, const Form& io) {
   io.number("tolerance", o.tolerance, {1e-13, 1e-1, false, "a number from 1e-13 to 0.1"},
             "relative, and absolute in SI");
   io.number("max_step", o.max_step, kNotNegative, "s; 0: free");
@@ -31,8 +25,7 @@ void each_field(EventOptions& o, Io&& io) {
   io.word("otherwise", o.otherwise);
 }
 
-template <class Io>
-void each_field(SteppingOptions& o, Io&& io) {
+inline void each_field(SteppingOptions& o, const Form& io) {
   constexpr const char* kOfSpeed = "of sqrt(gravity * size)";
   io.number("step", o.step, kPositive, "s");
   io.number("accuracy", o.accuracy, {0, 0.1, false, "a number from 0 to 0.1"},
@@ -54,31 +47,5 @@ void each_field(SteppingOptions& o, Io&& io) {
   io.word("on_failure", o.on_failure);
   io.count("threads", o.threads, 1, 256);
 }
-
-struct ReadField {
-  Fields& in;
-  void number(std::string_view key, double& x, const Range& range, std::string_view unit) {
-    x = in.number(key, x, range, unit);
-  }
-  void count(std::string_view key, int& x, int low, int high) { x = in.count(key, x, low, high); }
-  void flag(std::string_view key, bool& x) { x = in.flag(key, x); }
-  template <class E>
-  void word(std::string_view key, E& x) {
-    x = in.word(key, x);
-  }
-};
-
-struct WriteField {
-  Writer& out;
-  void number(std::string_view key, double x, const Range&, std::string_view unit) {
-    out.field(key, x, unit);
-  }
-  void count(std::string_view key, int x, int, int) { out.field(key, x); }
-  void flag(std::string_view key, bool x) { out.field(key, x); }
-  template <class E>
-  void word(std::string_view key, E x) {
-    out.raw(key, toml_word(x));
-  }
-};
 
 }  // namespace tether::scene::files

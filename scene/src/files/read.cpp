@@ -57,26 +57,14 @@ void check_times(const Scene& scene, Report& report) {
                  fmt::format("must be from 0 to the end, {} s", scene.end));
 }
 
-void read_scene_table(Fields& root, Reader& r) {
-  Fields in = r.fields(root.table("scene"), "scene");
-  r.scene.name = in.text("name", "");
-  r.scene.end = in.number("end", r.scene.end, kPositive, "s");
-  for (const effects::Effect* each : effects::all()) each->read_scene(in, r.scene);
-  r.scene.engine = in.word("engine", r.scene.engine);
-  r.scene.simultaneous_impacts = in.word("simultaneous_impacts", r.scene.simultaneous_impacts);
-  in.finish();
-}
-
 /// The table, where it is there; `check(in, options)` says what no single field shows.
 template <class Options, class Check>
 void read_options(Fields& root, Reader& r, const char* key, std::optional<Options>& to,
                   const Check& check) {
-  const Value* table = root.table(key);
-  if (table == nullptr) return;
-  Fields in = r.fields(table, key);
-  each_field(to.emplace(), ReadField{in});
-  check(in, *to);
-  in.finish();
+  Form(root, r).table(key, to, [&](const Form& form, Options& options) {
+    each_field(options, form);
+    check(*form.in(), options);
+  });
 }
 
 void check_stepping(Fields& in, const Scene& scene, const SteppingOptions& o) {
@@ -108,17 +96,6 @@ void read_engine(Fields& root, Reader& r) {
                "for otherwise = \"stepping\"");
 }
 
-void read_output(Fields& root, Reader& r) {
-  Fields in = r.fields(root.table("output"), "output");
-  Output& o = r.scene.output;
-  for (const formats::Format* each : formats::all())
-    o[each->name] = in.output_name(each->name, each->extension);
-  o.every = in.number("every", o.every, kNotNegative, "s; 0: end / 1000");
-  o.checkpoint = in.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
-  o.forces = in.flag("forces", o.forces);
-  in.finish();
-}
-
 using Names = std::map<std::string, int>;
 
 /// By name; the first of several.
@@ -130,47 +107,91 @@ Names index_of(const std::vector<Named>& all) {
   return out;
 }
 
-/// The index of the element of [[kind]] that the field `kind` names.
-int named(Fields& in, Reader& r, const char* kind, const Names& all) {
-  if (!in.has(kind)) {
-    in.missing(kind, fmt::format("the name of a {}", kind));
-    return -1;
-  }
+/// The element of [[kind]] that the field `kind` names.
+template <class Named>
+void named(const Form& form, const char* kind, const Names& names, const std::vector<Named>& all,
+           int& index) {
+  if (form.out()) return form.out()->field(kind, all[linalg::at(index)].name);
+  Fields& in = *form.in();
+  if (!in.has(kind)) return in.missing(kind, fmt::format("the name of a {}", kind));
   const std::string name = in.name(kind, "");
-  if (const auto found = all.find(name); found != all.end()) return found->second;
-  in.wrong(kind, fmt::format("no such {}{}", kind, r.hint_of(name, all)));
-  return -1;
+  const auto found = names.find(name);
+  if (found != names.end())
+    index = found->second;
+  else
+    in.wrong(kind, fmt::format("no such {}{}", kind, form.reader()->hint_of(name, names)));
 }
 
-void read_expect(Fields& in, Reader& r, const Names& joints, const Names& springs) {
-  Expect expect;
-  expect.place = in.place();
-  expect.time = in.number("time", r.scene.end, kNotNegative, "s");
-  expect.throughout = in.flag("throughout", expect.throughout);
-  if (!in.has("quantity")) in.missing("quantity", "what is judged, e.g. \"position\"");
-  expect.quantity = in.word("quantity", expect.quantity);
-  if (is_of_body(expect.quantity)) expect.body = r.body(in, "body");
-  if (is_force(expect.quantity) && is_of_body(expect.quantity) && in.has("against"))
-    expect.against = r.body(in, "against");
-  if (is_of_joint(expect.quantity)) expect.joint = named(in, r, "joint", joints);
-  if (is_of_spring(expect.quantity)) expect.spring = named(in, r, "spring", springs);
-
-  const std::size_t size = components(expect.quantity);
-  const Value* value = in.find("value");
-  if (value != nullptr && size == 1 && value->kind() == Value::Kind::number)
-    expect.value = {in.number("value", 0, kAny, "SI")};
-  else if (value != nullptr)
-    expect.value = in.numbers("value", {size}, "SI");
-  if (value != nullptr && !in.has("within")) in.missing("within", "largest difference, SI, >= 0");
-  if (value != nullptr) expect.within = in.number("within", 0, kNotNegative, "SI");
-  if (in.has("at_most")) expect.at_most = in.number("at_most", 0, kAny, "SI");
-  if (in.has("at_least")) expect.at_least = in.number("at_least", 0, kAny, "SI");
-  if (value == nullptr && !expect.at_most && !expect.at_least)
-    in.missing("value", "give value and within, at_most or at_least");
-  r.scene.expect.push_back(std::move(expect));
+void expected_value(const Form& form, Expect& e) {
+  Fields* const in = form.in();
+  const std::size_t size = components(e.quantity);
+  const Value* value = in ? in->find("value") : nullptr;
+  if (value && size == 1 && value->kind() == Value::Kind::number)
+    e.value = {in->number("value", 0, kAny, "SI")};
+  else if (value)
+    e.value = in->numbers("value", {size}, "SI");
+  else if (form.out() && e.value.size() == 1)
+    form.out()->field("value", e.value.front());
+  else if (form.out() && !e.value.empty())
+    form.out()->field("value", e.value);
+  if (value) form.require("within", "largest difference, SI, >= 0");
+  if (value || (!in && !e.value.empty())) form.number("within", e.within, kNotNegative, "SI");
+  form.number("at_most", e.at_most, kAny, {"SI"});
+  form.number("at_least", e.at_least, kAny, {"SI"});
+  if (in && !value && !e.at_most && !e.at_least)
+    in->missing("value", "give value and within, at_most or at_least");
 }
 
 }  // namespace
+
+void scene_fields(const Form& form, Scene& scene) {
+  if (form.in()) scene.name = form.in()->text("name", "");
+  if (form.out()) form.out()->field("name", scene.name);
+  form.number("end", scene.end, kPositive, "s");
+  for (const effects::Effect* each : effects::all()) each->scene_fields(form, scene);
+  form.word("engine", scene.engine);
+  form.word("simultaneous_impacts", scene.simultaneous_impacts);
+}
+
+void output_fields(const Form& form, Output& o) {
+  for (const formats::Format* each : formats::all())
+    if (form.in())
+      o[each->name] = form.in()->output_name(each->name, each->extension);
+    else
+      form.out()->field(each->name, o[each->name]);
+  form.number("every", o.every, kNotNegative, "s; 0: end / 1000");
+  form.number("checkpoint", o.checkpoint, kNotNegative, "s; 0: only at the end");
+  form.flag("forces", o.forces);
+}
+
+void list_fields(const Form& root, Scene& scene) {
+  root.each("pair", scene.pairs, [](const Form& form, Pair& pair) {
+    for (const effects::Effect* each : effects::all()) each->pair_fields(form, pair);
+    return true;
+  });
+  for (const effects::Effect* each : effects::all()) each->fields(root, scene);
+}
+
+void expect_fields(const Form& root, Scene& scene) {
+  const Names joints = index_of(scene.joints), springs = index_of(scene.springs);
+  root.each("expect", scene.expect, [&](const Form& form, Expect& e) {
+    if (form.in()) e.time = scene.end;
+    form.number("time", e.time, kNotNegative, "s");
+    form.flag("throughout", e.throughout);
+    form.require("quantity", "what is judged, e.g. \"position\"");
+    form.word("quantity", e.quantity);
+    Fields* const in = form.in();
+    if (in ? is_of_body(e.quantity) : e.body >= 0) form.body("body", e.body);
+    if (in ? is_force(e.quantity) && is_of_body(e.quantity) && in->has("against") : e.against >= 0)
+      form.body("against", e.against);
+    if (in ? is_of_joint(e.quantity) : e.joint >= 0)
+      named(form, "joint", joints, scene.joints, e.joint);
+    if (in ? is_of_spring(e.quantity) : e.spring >= 0)
+      named(form, "spring", springs, scene.springs, e.spring);
+    expected_value(form, e);
+    return true;
+  });
+}
 
 void check(const Scene& scene, Report& report) {
   check_bodies(scene, report);
@@ -185,7 +206,10 @@ Scene read(Value document, const std::string& name) {
   r.scene.file = name;
   Fields root(&document, "", name, report);
 
-  read_scene_table(root, r);
+  const Form all(root, r);
+  Fields table = r.fields(root.table("scene"), "scene");
+  scene_fields(Form(table, r), r.scene);
+  table.finish();
   // The document of a hundred thousand bodies need not stand beside what is read.
   Entry* entry = find_entry(document, "body");
   auto* bodies = entry != nullptr ? std::get_if<Value::Items>(&entry->value.held) : nullptr;
@@ -193,23 +217,19 @@ Scene read(Value document, const std::string& name) {
   r.each(root, "body", [&](Fields& in) {
     if (const std::size_t before = r.scene.bodies.size(); before > 0)
       (*bodies)[before - 1] = Value();
-    Body body = read_body(in, r);
-    for (const effects::Effect* each : effects::all()) each->read_body(in, r, body);
+    Body body;
+    body.place = in.place();
+    body_fields(Form(in, r), body);
     r.bodies.emplace(body.name, static_cast<int>(r.scene.bodies.size()));
     if (!body.material.empty()) r.materials.insert(body.material);
     r.scene.bodies.push_back(std::move(body));
   });
-  r.each(root, "pair", [&](Fields& in) {
-    Pair pair;
-    pair.place = in.place();
-    for (const effects::Effect* each : effects::all()) each->read_pair(in, r, pair);
-    r.scene.pairs.push_back(std::move(pair));
-  });
-  for (const effects::Effect* each : effects::all()) each->read(root, r);
+  list_fields(all, r.scene);
   read_engine(root, r);
-  read_output(root, r);
-  const Names joints = index_of(r.scene.joints), springs = index_of(r.scene.springs);
-  r.each(root, "expect", [&](Fields& in) { read_expect(in, r, joints, springs); });
+  Fields output = r.fields(root.table("output"), "output");
+  output_fields(Form(output, r), r.scene.output);
+  output.finish();
+  expect_fields(all, r.scene);
   root.finish();
   r.scene.surface_files.assign(r.surface_files.begin(), r.surface_files.end());
   // Parts that were wrong stand as defaults, which must not be blamed in turn.

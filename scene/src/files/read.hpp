@@ -5,12 +5,17 @@
 
 #include "bounds.hpp"
 #include "toml/document.hpp"
-#include "toml/reader.hpp"
+#include "toml/form.hpp"
 
 namespace tether::scene::files {
 
-/// One [[body]], but for the fields of effects.
-Body read_body(Fields& in, Reader& r);
+/// The fields of [scene], of a [[body]], of [output]; [[pair]] and the lists of effects;
+/// [[expect]].
+void scene_fields(const Form& form, Scene& scene);
+void body_fields(const Form& form, Body& body);
+void output_fields(const Form& form, Output& output);
+void list_fields(const Form& root, Scene& scene);
+void expect_fields(const Form& root, Scene& scene);
 /// The scene of a whole document. Throws SceneError.
 Scene read(Value document, const std::string& name);
 /// Checks across fields: names, pairs of materials, bodies that cannot move, times.

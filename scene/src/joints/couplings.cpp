@@ -123,39 +123,14 @@ namespace {
 
 class CouplingEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "coupling", [&](files::Fields& in) {
-      Coupling coupling;
-      coupling.place = in.place();
-      coupling.name = files::read_name(in, "coupling");
-      read_joints(in, r, coupling);
-      const std::size_t n = std::max<std::size_t>(2, coupling.joints.size());
-      if (in.has("weights")) coupling.weights = in.numbers("weights", {n}, "");
-      if (const files::Value* list = in.find("polynomial"); list != nullptr) {
-        const std::size_t terms =
-            list->kind() == files::Value::Kind::array ? list->items().size() : 0;
-        coupling.polynomial =
-            in.numbers("polynomial", {std::clamp<std::size_t>(terms, 1, kMostTerms)}, "");
-      }
-      if (in.has("ratio")) coupling.polynomial = {in.number("ratio", 1, files::kAny, "")};
-      if (in.has("ratio") + in.has("weights") + in.has("polynomial") != 1)
-        in.missing("ratio", "give ratio (of two joints), weights or polynomial, one of the three");
-      if (!coupling.joints.empty()) r.scene.couplings.push_back(std::move(coupling));
+  void fields(const files::Form& root, Scene& scene) const override {
+    root.each("coupling", scene.couplings, [&](const files::Form& form, Coupling& coupling) {
+      form.name("coupling", coupling.name);
+      if (form.in()) return read_terms(*form.in(), *form.reader(), coupling);
+      if (form.out()) write_terms(scene, coupling, *form.out());
+      if (form.units()) convert(scene, *form.units(), coupling);
+      return true;
     });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const Coupling& coupling : scene.couplings) {
-      out.item("coupling");
-      out.field("name", coupling.name);
-      std::string joints;
-      for (const int j : coupling.joints)
-        joints += (joints.empty() ? "" : ", ") + files::toml(scene.joints[at(j)].name);
-      out.raw("joints", "[" + joints + "]");
-      if (coupling.polynomial.empty())
-        out.field("weights", coupling.weights);
-      else
-        out.field("polynomial", coupling.polynomial);
-    }
   }
   void check(const Scene& scene, files::Report& report) const override {
     std::set<std::string> names;
@@ -174,18 +149,6 @@ class CouplingEffect : public Effect {
     if (!scene.couplings.empty())
       lines.push_back({"couplings", counted(scene.couplings.size(), "coupling") + " of joints"});
   }
-  // In units of the first coordinate.
-  void convert(Scene& scene, const Units& units) const override {
-    for (Coupling& coupling : scene.couplings) {
-      const auto unit = [&](std::size_t k) {
-        return joints::is_angle(scene.joints[at(coupling.joints[k])]) ? 1 : units.length;
-      };
-      for (std::size_t k = 0; k < coupling.weights.size(); ++k)
-        coupling.weights[k] *= unit(k) / unit(0);
-      double factor = 1 / unit(0);
-      for (double& c : coupling.polynomial) c *= factor *= unit(1);
-    }
-  }
   void limit_momenta(Momenta& momenta) const override {
     for (const Coupling& coupling : momenta.scene.couplings)
       for (const int j : coupling.joints) {
@@ -198,6 +161,40 @@ class CouplingEffect : public Effect {
  private:
   static constexpr std::size_t kMostTerms = 16;
 
+  static bool read_terms(files::Fields& in, files::Reader& r, Coupling& coupling) {
+    read_joints(in, r, coupling);
+    const std::size_t n = std::max<std::size_t>(2, coupling.joints.size());
+    if (in.has("weights")) coupling.weights = in.numbers("weights", {n}, "");
+    if (const files::Value* list = in.find("polynomial"); list != nullptr) {
+      const std::size_t terms =
+          list->kind() == files::Value::Kind::array ? list->items().size() : 0;
+      coupling.polynomial =
+          in.numbers("polynomial", {std::clamp<std::size_t>(terms, 1, kMostTerms)}, "");
+    }
+    if (in.has("ratio")) coupling.polynomial = {in.number("ratio", 1, files::kAny, "")};
+    if (in.has("ratio") + in.has("weights") + in.has("polynomial") != 1)
+      in.missing("ratio", "give ratio (of two joints), weights or polynomial, one of the three");
+    return !coupling.joints.empty();
+  }
+  static void write_terms(const Scene& scene, const Coupling& coupling, files::Writer& out) {
+    std::vector<std::string> joints;
+    for (const int j : coupling.joints) joints.push_back(files::toml(scene.joints[at(j)].name));
+    out.raw("joints", "[" + files::list(joints) + "]");
+    if (coupling.polynomial.empty())
+      out.field("weights", coupling.weights);
+    else
+      out.field("polynomial", coupling.polynomial);
+  }
+  // In units of the first coordinate.
+  static void convert(const Scene& scene, const Units& units, Coupling& coupling) {
+    const auto unit = [&](std::size_t k) {
+      return joints::is_angle(scene.joints[at(coupling.joints[k])]) ? 1 : units.length;
+    };
+    for (std::size_t k = 0; k < coupling.weights.size(); ++k)
+      coupling.weights[k] *= unit(k) / unit(0);
+    double factor = 1 / unit(0);
+    for (double& c : coupling.polynomial) c *= factor *= unit(1);
+  }
   static void read_joints(files::Fields& in, files::Reader& r, Coupling& coupling) {
     constexpr const char* kAllowed = "an array of two names of joints or more";
     using Kind = files::Value::Kind;

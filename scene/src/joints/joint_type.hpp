@@ -5,9 +5,7 @@
 #include "coordinate.hpp"
 #include "joint_rows.hpp"
 #include "mechanics/momenta.hpp"
-#include "mechanics/units.hpp"
-#include "toml/fields.hpp"
-#include "toml/writer.hpp"
+#include "toml/form.hpp"
 
 namespace tether::scene::joints {
 
@@ -18,10 +16,7 @@ class JointType {
   virtual JointKind kind() const = 0;
 
   /// Its fields beside name, kind, bodies and motion. Default: the point `at`.
-  virtual void read(files::Fields& in, Joint& joint) const { read_point(in, joint); }
-  virtual void write(const Joint& joint, files::Writer& out) const {
-    out.field("at", joint.at, "m");
-  }
+  virtual void fields(const files::Form& form, Joint& joint) const { point(form, joint); }
   /// Checks what must hold of a joint that was filled in by hand, beside two bodies that can move
   /// against each other. Throws std::invalid_argument; `name` for messages.
   virtual void check(const Joint&, const std::string& /*name*/) const {}
@@ -48,13 +43,13 @@ class JointType {
  protected:
   static constexpr double kOrigin = 1e-12;  // m: a point this near to the origin is there
 
-  static void read_point(files::Fields& in, Joint& joint) {
-    if (!in.has("at")) in.missing("at", "a point [x, y, z], world, m");
-    joint.at = in.vector("at", joint.at, files::kAny, "m");
+  static void point(const files::Form& form, Joint& joint) {
+    form.require("at", "a point [x, y, z], world, m");
+    form.vector("at", joint.at, kMetres);
   }
-  static void read_axis(files::Fields& in, Joint& joint) {
-    if (!in.has("axis")) in.missing("axis", "a direction [x, y, z], world");
-    joint.axis = in.direction("axis", joint.axis);
+  static void axis(const files::Form& form, Joint& joint) {
+    form.require("axis", "a direction [x, y, z], world");
+    form.direction("axis", joint.axis);
   }
   static void check_axis(const Vector3d& axis, const std::string& name) {
     if (!(axis.norm() > 0))
@@ -65,13 +60,9 @@ class JointType {
 /// A joint of a point and a direction in common.
 class AxisJoint : public JointType {
  public:
-  void read(files::Fields& in, Joint& joint) const override {
-    read_point(in, joint);
-    read_axis(in, joint);
-  }
-  void write(const Joint& joint, files::Writer& out) const override {
-    out.field("at", joint.at, "m");
-    out.field("axis", joint.axis);
+  void fields(const files::Form& form, Joint& joint) const override {
+    point(form, joint);
+    axis(form, joint);
   }
   void check(const Joint& joint, const std::string& name) const override {
     check_axis(joint.axis, name);

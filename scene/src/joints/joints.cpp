@@ -14,53 +14,43 @@ using joints::JointType;
 
 namespace {
 
-void read_one(files::Fields& in, files::Reader& r) {
-  Joint joint;
-  joint.place = in.place();
-  joint.name = files::read_name(in, "joint");
+// False: its kind is not known, and what it would have is passed over.
+bool read_kind(files::Fields& in, Joint& joint) {
   if (!in.has("kind")) {
     std::vector<std::string> words;
     for (const auto& [text, kind] : kJointWords) words.emplace_back(text);
     in.missing("kind", "it is one of " + files::list(words));
   }
   const std::optional<JointKind> kind = in.word_of<JointKind>("kind");
-  r.two_bodies(in, joint.first, joint.second);
   if (!kind)
-    return in.pass_over({"at", "axis", "length", "motion", "limits", "limits_deg", "limits_rad",
-                         "limit_restitution", "motor", "friction", "spring"});
-  joint.kind = *kind;
-  const JointType& type = joints::type(*kind);
-  type.read(in, joint);
+    in.pass_over({"at", "axis", "length", "motion", "limits", "limits_deg", "limits_rad",
+                  "limit_restitution", "motor", "friction", "spring"});
+  joint.kind = kind.value_or(joint.kind);
+  return kind.has_value();
+}
+
+bool one_joint(const files::Form& form, Joint& joint) {
+  form.name("joint", joint.name);
+  const bool known = !form.in() || read_kind(*form.in(), joint);
+  if (form.out()) form.word("kind", joint.kind);
+  form.bodies(joint.first, joint.second);
+  if (!known) return false;
+  const JointType& type = joints::type(joint.kind);
+  type.fields(form, joint);
   if (type.motion() != JointType::MotionOf::nothing)
-    if (const files::Value* motion = in.table("motion")) {
-      files::Fields fields = r.fields(motion, in.path() + ": motion");
-      joint.motion = joints::read_motion(fields, type.motion() == JointType::MotionOf::angle);
-    }
+    form.table("motion", joint.motion, [&](const files::Form& in, Motion& motion) {
+      joints::motion_fields(in, type.motion() == JointType::MotionOf::angle, motion);
+    });
   for (const Effect* each : all())
     if (type.is_free() || (type.turns_freely() && each->acts_on_turns()))
-      each->read_joint(in, r, type.motion() != JointType::MotionOf::length, joint);
-  r.scene.joints.push_back(std::move(joint));
+      each->joint_fields(form, type.motion() != JointType::MotionOf::length, joint);
+  return true;
 }
 
 class JointEffect : public Effect {
  public:
-  void read(files::Fields& root, files::Reader& r) const override {
-    r.each(root, "joint", [&](files::Fields& in) { read_one(in, r); });
-  }
-  void write(const Scene& scene, files::Writer& out) const override {
-    for (const Joint& joint : scene.joints) {
-      const JointType& type = joints::type(joint.kind);
-      out.item("joint");
-      out.field("name", joint.name);
-      out.raw("kind", files::toml_word(joint.kind));
-      out.raw("bodies", files::two_names(scene, joint.first, joint.second));
-      type.write(joint, out);
-      if (joint.motion)
-        joints::write_motion(*joint.motion, type.motion() == JointType::MotionOf::angle, out);
-      for (const Effect* each : all())
-        if (type.is_free() || (type.turns_freely() && each->acts_on_turns()))
-          each->write_joint(joint, type.motion() != JointType::MotionOf::length, out);
-    }
+  void fields(const files::Form& root, Scene& scene) const override {
+    root.each("joint", scene.joints, one_joint);
   }
   void check(const Scene& scene, files::Report& report) const override {
     files::check_connections(scene, scene.joints, "joint", report);
@@ -95,13 +85,6 @@ class JointEffect : public Effect {
       take_arm(scene, joint.first, joint.at, length);
       take_arm(scene, joint.second, type.point_on_second(joint), length);
       type.take_lengths(joint, length);
-    }
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Joint& joint : scene.joints) {
-      joint.at /= units.length;
-      joint.at_second /= units.length;
-      if (joint.length) *joint.length /= units.length;
     }
   }
   void limit_momenta(Momenta& momenta) const override {

@@ -20,27 +20,11 @@ Now evaluate(const Motion& motion, double t) {
   return now;
 }
 
-Motion read_motion(files::Fields& in, bool angle) {
-  Motion m;
-  if (angle) {
-    m.rate = in.angle("rate_", m.rate, "/s");
-    m.amplitude = in.angle("amplitude_", m.amplitude);
-  } else {
-    m.rate = in.number("rate", m.rate, files::kAny, "m/s");
-    m.amplitude = in.number("amplitude", m.amplitude, files::kAny, "m");
-  }
-  m.frequency = in.number("frequency", m.frequency, files::kNotNegative, "Hz");
-  m.phase = in.angle("phase_", m.phase);
-  in.finish();
-  return m;
-}
-
-void write_motion(const Motion& m, bool angle, files::Writer& out) {
-  using files::toml;
-  const char* const unit = angle ? "_rad" : "";
-  out.raw("motion",
-          fmt::format("{{ rate{} = {}, amplitude{} = {}, frequency = {}, phase_rad = {} }}", unit,
-                      toml(m.rate), unit, toml(m.amplitude), toml(m.frequency), toml(m.phase)));
+void motion_fields(const files::Form& form, bool angle, Motion& m) {
+  form.along(angle, "rate", m.rate, kSpeed);
+  form.along(angle, "amplitude", m.amplitude, kMetres);
+  form.number("frequency", m.frequency, files::kNotNegative, kHertz);
+  form.angle("phase_", m.phase);
 }
 
 }  // namespace joints
@@ -76,15 +60,6 @@ class PrescribedMotion : public Effect {
       if (!joint.motion) continue;
       rate.take(joint.motion->frequency);
       rate.take(std::abs(joint.motion->rate) / (is_angle(joint) ? 1 : length));
-    }
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Joint& joint : scene.joints) {
-      if (!joint.motion) continue;
-      const double way = is_angle(joint) ? 1 : units.length;
-      joint.motion->rate /= way / units.time;
-      joint.motion->amplitude /= way;
-      joint.motion->frequency *= units.time;
     }
   }
   bool does_work(const Scene& scene) const override { return any_of(scene.joints, is_driven); }

@@ -11,8 +11,7 @@
 
 #include "coordinate.hpp"
 #include "mechanics/frames.hpp"
-#include "toml/fields.hpp"
-#include "toml/writer.hpp"
+#include "toml/form.hpp"
 
 namespace tether::scene::joints {
 
@@ -24,8 +23,7 @@ struct Now {
 Now evaluate(const Motion& motion, double t);
 
 /// The fields of motion = {...}; `angle`: in rad or degrees, else in m.
-Motion read_motion(files::Fields& in, bool angle);
-void write_motion(const Motion& motion, bool angle, files::Writer& out);
+void motion_fields(const files::Form& form, bool angle, Motion& motion);
 
 using namespace mechanics;
 

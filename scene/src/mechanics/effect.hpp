@@ -6,9 +6,7 @@
 
 #include "force.hpp"
 #include "momenta.hpp"
-#include "toml/reader.hpp"
-#include "toml/writer.hpp"
-#include "units.hpp"
+#include "toml/form.hpp"
 
 namespace tether::scene::mechanics {
 
@@ -69,22 +67,16 @@ class Effect {
  public:
   virtual ~Effect() = default;
 
-  /// Its own tables of the file, and its fields in tables that it shares with others. Every reader
-  /// asks for all its keys, and leaves a default where one is wrong.
-  virtual void read(files::Fields& /*root*/, files::Reader&) const {}
-  virtual void read_scene(files::Fields&, Scene&) const {}
-  virtual void read_body(files::Fields&, files::Reader&, Body&) const {}
+  /// Its own tables of the file, and its fields in tables that it shares with others. Where they
+  /// are read every key is asked for, and what is wrong leaves a default.
+  virtual void fields(const files::Form& /*root*/, Scene&) const {}
+  virtual void scene_fields(const files::Form&, Scene&) const {}
+  virtual void body_fields(const files::Form&, Body&) const {}
   /// `angle`: the joint turns; else it slides. Of joints with a free coordinate, and of balls if
   /// the effect acts on their turns.
-  virtual void read_joint(files::Fields&, files::Reader&, bool /*angle*/, Joint&) const {}
+  virtual void joint_fields(const files::Form&, bool /*angle*/, Joint&) const {}
   virtual bool acts_on_turns() const { return false; }
-  virtual void read_pair(files::Fields&, files::Reader&, Pair&) const {}
-  /// The same, to be read again.
-  virtual void write(const Scene&, files::Writer&) const {}
-  virtual void write_scene(const Scene&, files::Writer&) const {}
-  virtual void write_body(const Body&, files::Writer&) const {}
-  virtual void write_joint(const Joint&, bool /*angle*/, files::Writer&) const {}
-  virtual void write_pair(const Pair&, files::Writer&) const {}
+  virtual void pair_fields(const files::Form&, Pair&) const {}
   /// Checks across the fields of a scene.
   virtual void check(const Scene&, files::Report&) const {}
   virtual void check_body(const Body&, files::Report&) const {}
@@ -103,8 +95,6 @@ class Effect {
   /// Lengths (m) and rates (1/s) of the scene; `length` and `mass`: its size.
   virtual void take_lengths(const Scene&, Largest&) const {}
   virtual void take_rates(const Scene&, double /*length*/, double /*mass*/, Largest&) const {}
-  /// Divides its numbers by their units.
-  virtual void convert(Scene&, const Units&) const {}
 
   /// Adds the times at which its forces have kinks or jump, s.
   virtual void add_kinks(const Scene&, std::vector<double>& /*times*/) const {}

@@ -79,8 +79,15 @@ Scene in_units(const Scene& scene, const Units& u) {
     body.velocity /= u.speed();
     body.angular_velocity *= u.time;
   }
-  for (const effects::Effect* each : effects::all()) each->convert(out, u);
+  const files::Form form(u);
+  for (const effects::Effect* each : effects::all()) {
+    each->scene_fields(form, out);
+    for (Body& body : out.bodies) each->body_fields(form, body);
+    for (Pair& pair : out.pairs) each->pair_fields(form, pair);
+    each->fields(form, out);
+  }
   if (out.smooth) out.smooth->max_step /= u.time;
+  if (out.event) out.event->max_step /= u.time;
   return out;
 }
 

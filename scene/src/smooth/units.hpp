@@ -3,12 +3,9 @@
 
 #include <tether/scene/engine.hpp>
 
-#include "mechanics/units.hpp"
+#include "dimensions.hpp"
 
 namespace tether::scene::smooth {
-
-using mechanics::Largest;
-using mechanics::Units;
 
 /// By the largest lever arms and distances of bodies that move, the shortest time that velocities
 /// and effects have at this size, and the heaviest body.
@@ -31,17 +28,17 @@ namespace tether::scene::event {
 
 /// As those of smooth::units_of where these are not SI; else never above 1 m and 1 s, and
 /// below them natural ones: bands and tolerances of a toy of millimetres are parts of a millimetre.
-inline smooth::Units units_of(const Scene& scene) {
-  const smooth::Units usual = smooth::units_of(scene);
+inline Units units_of(const Scene& scene) {
+  const Units usual = smooth::units_of(scene);
   if (usual.length != 1 || usual.time != 1) return usual;
-  smooth::Units units = smooth::natural_units(scene);
+  Units units = smooth::natural_units(scene);
   units.length = std::min(1.0, units.length);
   units.time = std::min(1.0, units.time);
   return units;
 }
 
-/// As smooth::in_units, with the shapes, and the longest step of [event].
-inline Scene scaled(const Scene& scene, const smooth::Units& u) {
+/// As smooth::in_units, with the shapes.
+inline Scene scaled(const Scene& scene, const Units& u) {
   Scene out = smooth::in_units(scene, u);
   for (Body& body : out.bodies)
     for (Shape& shape : body.shapes) {
@@ -51,11 +48,6 @@ inline Scene scaled(const Scene& scene, const smooth::Units& u) {
       shape.position /= u.length;
       for (Eigen::Vector3d& p : shape.points) p /= u.length;
     }
-  for (Pair& pair : out.pairs) {
-    pair.rolling /= u.length;
-    pair.torsional /= u.length;
-  }
-  if (out.event) out.event->max_step /= u.time;
   return out;
 }
 

@@ -63,6 +63,10 @@ std::string toml(const std::vector<std::array<double, 2>>& rows) {
 }
 
 void Writer::raw(std::string_view key, const std::string& value, std::string_view comment) {
+  if (layout_ == Layout::inside) {
+    text_ += fmt::format("{}{} = {}", text_.empty() ? "" : ", ", key, value);
+    return;
+  }
   text_ += fmt::format("{} = {}", key, value);
   if (!comment.empty()) text_ += fmt::format("  # {}", comment);
   text_ += '\n';
@@ -75,10 +79,6 @@ std::string names(const Scene& scene, const std::vector<int>& bodies) {
         (text.empty() ? "" : ", ") +
         toml(body < 0 ? std::string("world") : scene.bodies[static_cast<std::size_t>(body)].name);
   return "[" + text + "]";
-}
-
-std::string two_names(const Scene& scene, int first, int second) {
-  return names(scene, {first, second});
 }
 
 }  // namespace tether::scene::files

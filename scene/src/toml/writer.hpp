@@ -24,9 +24,11 @@ std::string toml_word(E value) {
   return toml(word(value));
 }
 
-/// Writes tables line by line.
+/// Writes tables line by line, or the inside of one in a line.
 class Writer {
  public:
+  enum class Layout { lines, inside };
+  explicit Writer(Layout layout = Layout::lines) : layout_(layout) {}
   void table(std::string_view name) { text_ += fmt::format("\n[{}]\n", name); }
   void item(std::string_view name) { text_ += fmt::format("\n[[{}]]\n", name); }
   template <class T>
@@ -38,11 +40,11 @@ class Writer {
   std::string take() { return std::move(text_); }
 
  private:
+  Layout layout_;
   std::string text_;
 };
 
 /// The names of bodies, -1 being the world: ["a", "world"]
 std::string names(const Scene& scene, const std::vector<int>& bodies);
-std::string two_names(const Scene& scene, int first, int second);
 
 }  // namespace tether::scene::files

@@ -3,7 +3,6 @@
 // Two points at a distance, which a motion changes; 1 row.
 
 #include "joints/joint_type.hpp"
-#include "toml/reader.hpp"
 
 namespace tether::scene::joints {
 
@@ -13,15 +12,12 @@ class DistanceJoint : public JointType {
  public:
   JointKind kind() const override { return JointKind::distance; }
   MotionOf motion() const override { return MotionOf::length; }
-  void read(files::Fields& in, Joint& joint) const override {
-    files::read_two_points(in, joint.at, joint.at_second);
-    if (in.has("length")) joint.length = in.number("length", 1, files::kPositive, "m");
+  void fields(const files::Form& form, Joint& joint) const override {
+    form.points(joint.at, joint.at_second);
+    form.number("length", joint.length, files::kPositive, kMetres);
     const bool apart = (joint.at - joint.at_second).norm() > 0;
-    if (in.has("at") && !apart) in.wrong("at", "the two points must be apart");
-  }
-  void write(const Joint& joint, files::Writer& out) const override {
-    out.raw("at", files::toml(std::vector<Vector3d>{joint.at, joint.at_second}), "m");
-    if (joint.length) out.field("length", *joint.length, "m");
+    if (files::Fields* in = form.in(); in && in->has("at") && !apart)
+      in->wrong("at", "the two points must be apart");
   }
   void check(const Joint& joint, const std::string& name) const override {
     if (!(length(joint) > 0))

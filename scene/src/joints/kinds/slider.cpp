@@ -12,9 +12,9 @@ class Slider : public AxisJoint {
   JointKind kind() const override { return JointKind::slider; }
   MotionOf motion() const override { return MotionOf::length; }
   bool is_free() const override { return true; }
-  void read(files::Fields& in, Joint& joint) const override {
-    joint.at = in.vector("at", joint.at, files::kAny, "m");
-    read_axis(in, joint);
+  void fields(const files::Form& form, Joint& joint) const override {
+    form.vector("at", joint.at, kMetres);
+    axis(form, joint);
   }
   void add_rows(RowBuilder& rows) const override {
     rows.same_attitude();

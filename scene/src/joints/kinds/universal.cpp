@@ -12,23 +12,10 @@ namespace {
 class Universal : public JointType {
  public:
   JointKind kind() const override { return JointKind::universal; }
-  void read(files::Fields& in, Joint& joint) const override {
-    read_point(in, joint);
-    constexpr const char* kAllowed =
-        "the arms of the cross [[x, y, z], [x, y, z]] on the first and on the second body, world, "
-        "at "
-        "right angles";
-    if (!in.has("axis")) in.missing("axis", kAllowed);
-    const std::vector<Vector3d> axes = in.points("axis", 2, 2);
-    if (axes.empty()) return;
-    if (!(axes[0].norm() > 0 && axes[1].norm() > 0 && is_right(axes[0], axes[1])))
-      return in.wrong("axis", std::string("must be ") + kAllowed);
-    joint.axis = axes[0];
-    joint.axis_second = axes[1];
-  }
-  void write(const Joint& joint, files::Writer& out) const override {
-    out.field("at", joint.at, "m");
-    out.raw("axis", files::toml(std::vector<Vector3d>{joint.axis, joint.axis_second}));
+  void fields(const files::Form& form, Joint& joint) const override {
+    point(form, joint);
+    if (form.in()) read_arms(*form.in(), joint);
+    if (form.out()) form.out()->field("axis", std::vector<Vector3d>{joint.axis, joint.axis_second});
   }
   void check(const Joint& joint, const std::string& name) const override {
     check_axis(joint.axis, name);
@@ -42,6 +29,19 @@ class Universal : public JointType {
   }
 
  private:
+  static void read_arms(files::Fields& in, Joint& joint) {
+    constexpr const char* kAllowed =
+        "the arms of the cross [[x, y, z], [x, y, z]] on the first and on the second body, world, "
+        "at "
+        "right angles";
+    if (!in.has("axis")) in.missing("axis", kAllowed);
+    const std::vector<Vector3d> axes = in.points("axis", 2, 2);
+    if (axes.empty()) return;
+    if (!(axes[0].norm() > 0 && axes[1].norm() > 0 && is_right(axes[0], axes[1])))
+      return in.wrong("axis", std::string("must be ") + kAllowed);
+    joint.axis = axes[0];
+    joint.axis_second = axes[1];
+  }
   // Digits of a file are rounded; the start is moved onto the joint.
   static bool is_right(const Vector3d& u, const Vector3d& v) {
     return std::abs(u.normalized().dot(v.normalized())) < 1e-6;

@@ -15,15 +15,8 @@ bool rubs(const Joint& joint) { return joint.friction != 0; }
 class JointFrictionEffect : public JointLawEffect {
  public:
   JointFrictionEffect() : JointLawEffect("joint friction", rubs) {}
-  void read_joint(files::Fields& in, files::Reader&, bool angle, Joint& joint) const override {
-    joint.friction = in.number("friction", 0, files::kNotNegative, angle ? "N m" : "N");
-  }
-  void write_joint(const Joint& joint, bool angle, files::Writer& out) const override {
-    out.field("friction", joint.friction, angle ? "N m" : "N");
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Joint& joint : scene.joints)
-      joint.friction /= joints::is_angle(joint) ? units.energy() : units.force();
+  void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
+    form.number("friction", joint.friction, files::kNotNegative, angle ? kMoment : kForce);
   }
   void add_laws(const Joint& joint, int number, double, JointLawList& out) const override {
     if (rubs(joint)) out.bounded(number, 0, joint.friction);

@@ -18,9 +18,12 @@ class JointLawEffect : public Effect {
  protected:
   JointLawEffect(const char* title, bool (*has)(const Joint&)) : title_(title), has_(has) {}
 
-  static void read_gains(files::Fields& in, bool angle, double& stiffness, double& damping) {
-    stiffness = in.number("stiffness", 0, files::kNotNegative, angle ? "N m/rad" : "N/m");
-    damping = in.number("damping", 0, files::kNotNegative, angle ? "N m s/rad" : "N s/m");
+  static void stiffness(const files::Form& form, bool angle, double& x) {
+    form.number("stiffness", x, files::kNotNegative,
+                angle ? Unit{"N m/rad", 1, 2, -2} : kStiffness);
+  }
+  static void damping(const files::Form& form, bool angle, double& x) {
+    form.number("damping", x, files::kNotNegative, angle ? Unit{"N m s/rad", 1, 2, -1} : kDamping);
   }
 
  private:

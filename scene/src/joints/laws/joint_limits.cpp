@@ -14,46 +14,42 @@ namespace {
 
 bool has_limits(const Joint& joint) { return joint.limits.has_value(); }
 
+void read_limits(files::Fields& in, bool angle, Joint& joint) {
+  const bool degrees = angle && in.has("limits_deg");
+  const char* const key = degrees ? "limits_deg" : angle ? "limits_rad" : "limits";
+  if (degrees && in.has("limits_rad"))
+    return in.wrong("limits_deg", "give limits_deg or limits_rad, not both");
+  if (!in.has(key)) {
+    if (in.has("limit_restitution"))
+      in.wrong("limit_restitution", "is of limits, and there are none");
+    return;
+  }
+  const std::vector<double> list = in.numbers(key, {2}, degrees ? "degrees" : angle ? "rad" : "m");
+  if (list.size() != 2) return;
+  const double unit = degrees ? linalg::kPi / 180 : 1;
+  JointLimits& limits = joint.limits.emplace();
+  limits.lower = unit * list[0];
+  limits.upper = unit * list[1];
+  limits.restitution = in.number("limit_restitution", 0, files::kPart, "");
+  if (!(limits.lower <= 0 && limits.upper >= 0 && limits.lower < limits.upper))
+    in.wrong(key, "must be [least, largest] with 0, where the joint starts, between them");
+  if (angle && !(limits.upper - limits.lower < 2 * linalg::kPi))
+    in.wrong(key, "must be less than a full turn apart");
+}
+
 class JointLimitEffect : public JointLawEffect {
  public:
   JointLimitEffect() : JointLawEffect("joint limits", has_limits) {}
-  void read_joint(files::Fields& in, files::Reader&, bool angle, Joint& joint) const override {
-    const bool degrees = angle && in.has("limits_deg");
-    const char* const key = degrees ? "limits_deg" : angle ? "limits_rad" : "limits";
-    if (degrees && in.has("limits_rad"))
-      return in.wrong("limits_deg", "give limits_deg or limits_rad, not both");
-    if (!in.has(key)) {
-      if (in.has("limit_restitution"))
-        in.wrong("limit_restitution", "is of limits, and there are none");
-      return;
-    }
-    const std::vector<double> list = in.numbers(key, {2},
-                                                degrees ? "degrees"
-                                                : angle ? "rad"
-                                                        : "m");
-    if (list.size() != 2) return;
-    const double unit = degrees ? linalg::kPi / 180 : 1;
-    JointLimits& limits = joint.limits.emplace();
-    limits.lower = unit * list[0];
-    limits.upper = unit * list[1];
-    limits.restitution = in.number("limit_restitution", 0, files::kPart, "");
-    if (!(limits.lower <= 0 && limits.upper >= 0 && limits.lower < limits.upper))
-      in.wrong(key, "must be [least, largest] with 0, where the joint starts, between them");
-    if (angle && !(limits.upper - limits.lower < 2 * linalg::kPi))
-      in.wrong(key, "must be less than a full turn apart");
-  }
-  void write_joint(const Joint& joint, bool angle, files::Writer& out) const override {
+  void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
+    if (form.in()) return read_limits(*form.in(), angle, joint);
     if (!joint.limits) return;
-    out.field(angle ? "limits_rad" : "limits",
-              std::vector<double>{joint.limits->lower, joint.limits->upper});
-    out.field("limit_restitution", joint.limits->restitution);
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Joint& joint : scene.joints) {
-      if (!joint.limits || joints::is_angle(joint)) continue;
-      joint.limits->lower /= units.length;
-      joint.limits->upper /= units.length;
-    }
+    if (form.out())
+      form.out()->field(angle ? "limits_rad" : "limits",
+                        std::vector<double>{joint.limits->lower, joint.limits->upper});
+    form.number("limit_restitution", joint.limits->restitution, files::kPart);
+    if (!form.units() || angle) return;
+    joint.limits->lower /= form.units()->length;
+    joint.limits->upper /= form.units()->length;
   }
   void add_laws(const Joint& joint, int number, double value, JointLawList& out) const override {
     if (!joint.limits) return;

@@ -190,18 +190,20 @@ bool is_table(const Table& table) {
   return last[1] > 0;
 }
 
-void read_table(files::Fields& in, const char* gain, const Joint& joint, Table& out) {
+void table_fields(const files::Form& form, const char* gain, bool is_free, const Unit& number,
+                  const Unit& force, Table& table) {
   const std::string key = std::string(gain) + "_table";
-  if (!in.has(key)) return;
-  if (!joints::type(joint.kind).is_free()) return in.wrong(key, "is of hinges and sliders");
-  if (in.has(gain)) return in.wrong(key, fmt::format("give {} or {}, not both", gain, key));
-  Table table = in.pairs(key, kMostRows);
-  if (is_table(table))
-    out = std::move(table);
-  else
-    in.wrong(key, fmt::format("must be an array of up to {} [number above 0, force], numbers that "
-                              "grow, forces that do not fall, the last above 0",
-                              kMostRows));
+  form.rows(key, table, kMostRows, number, force);
+  files::Fields* in = form.in();
+  if (!in || !in->has(key)) return;
+  if (!is_free)
+    in->wrong(key, "is of hinges and sliders");
+  else if (in->has(gain))
+    in->wrong(key, fmt::format("give {} or {}, not both", gain, key));
+  else if (!is_table(table))
+    in->wrong(key, fmt::format("must be an array of up to {} [number above 0, force], numbers that "
+                               "grow, forces that do not fall, the last above 0",
+                               kMostRows));
 }
 
 class JointSpringEffect : public JointLawEffect {
@@ -210,36 +212,22 @@ class JointSpringEffect : public JointLawEffect {
   bool has_joint_laws(const Scene&) const override { return false; }
   bool acts_on_turns() const override { return true; }
 
-  void read_joint(files::Fields& in, files::Reader& r, bool angle, Joint& joint) const override {
-    const files::Value* table = in.table("spring");
-    if (table == nullptr) return;
-    files::Fields fields = r.fields(table, in.path() + ": spring");
-    JointSpring& spring = joint.spring.emplace();
-    read_gains(fields, angle, spring.stiffness, spring.damping);
-    read_table(fields, "stiffness", joint, spring.stiffness_table);
-    read_table(fields, "damping", joint, spring.damping_table);
-    if (!(spring.stiffness > 0 || spring.damping > 0) && !fields.has("stiffness_table") &&
-        !fields.has("damping_table"))
-      fields.missing("stiffness", angle ? "give stiffness (N m/rad), damping (N m s/rad) or both"
-                                        : "give stiffness (N/m), damping (N s/m) or both");
-    if (joints::type(joint.kind).is_free())
-      spring.rest = angle ? fields.angle("rest_", 0) : fields.number("rest", 0, files::kAny, "m");
-    fields.finish();
-  }
-  void write_joint(const Joint& joint, bool angle, files::Writer& out) const override {
-    if (!joint.spring) return;
-    const JointSpring& s = *joint.spring;
-    std::string text;
-    const auto add = [&](const char* key, double gain, const Table& table) {
-      text += text.empty() ? "{ " : ", ";
-      text += table.empty() ? fmt::format("{} = {}", key, files::toml(gain))
-                            : fmt::format("{}_table = {}", key, files::toml(table));
-    };
-    add("stiffness", s.stiffness, s.stiffness_table);
-    add("damping", s.damping, s.damping_table);
-    if (joints::type(joint.kind).is_free())
-      text += fmt::format(", rest{} = {}", angle ? "_rad" : "", files::toml(s.rest));
-    out.raw("spring", text + " }");
+  void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
+    const bool is_free = joints::type(joint.kind).is_free();
+    const Unit force = angle ? kMoment : kForce;
+    form.table("spring", joint.spring, [&](const files::Form& in, JointSpring& spring) {
+      if (in.in() || spring.stiffness_table.empty()) stiffness(in, angle, spring.stiffness);
+      if (in.in() || spring.damping_table.empty()) damping(in, angle, spring.damping);
+      table_fields(in, "stiffness", is_free, angle ? Unit{} : kMetres, force,
+                   spring.stiffness_table);
+      table_fields(in, "damping", is_free, angle ? kTurning : kSpeed, force, spring.damping_table);
+      if (files::Fields* read = in.in(); read && !(spring.stiffness > 0 || spring.damping > 0) &&
+                                         !read->has("stiffness_table") &&
+                                         !read->has("damping_table"))
+        read->missing("stiffness", angle ? "give stiffness (N m/rad), damping (N m s/rad) or both"
+                                         : "give stiffness (N/m), damping (N s/m) or both");
+      if (is_free) in.along(angle, "rest", spring.rest, kMetres);
+    });
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
     each_gains(scene, [&](const Joint& joint, std::size_t, const Gains& gains) {
@@ -251,25 +239,6 @@ class JointSpringEffect : public JointLawEffect {
       const double of = joint.kind == JointKind::slider ? mass : mass * length * length;
       rate.take(std::sqrt(gains.stiffness / of));
     });
-  }
-  void convert(Scene& scene, const Units& units) const override {
-    for (Joint& joint : scene.joints) {
-      if (!joint.spring) continue;
-      const bool slides = joint.kind == JointKind::slider;
-      const double stiffness = slides ? units.stiffness() : units.energy();
-      joint.spring->stiffness /= stiffness;
-      joint.spring->damping /= stiffness * units.time;
-      if (slides) joint.spring->rest /= units.length;
-      const double length = slides ? units.length : 1;
-      for (std::array<double, 2>& row : joint.spring->stiffness_table) {
-        row[0] /= length;
-        row[1] /= stiffness * length;
-      }
-      for (std::array<double, 2>& row : joint.spring->damping_table) {
-        row[0] /= length / units.time;
-        row[1] /= stiffness * length;
-      }
-    }
   }
   void limit_momenta(Momenta& momenta) const override {
     each_gains(momenta.scene, [&](const Joint& joint, std::size_t number, const Gains&) {

@@ -1,8 +1,8 @@
 // Tether: energy and momenta that the projection keeps. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "dimensions.hpp"
 #include "mechanics/force.hpp"
-#include "mechanics/units.hpp"
 #include "smooth/rows/moving_bodies.hpp"
 
 namespace tether::scene::smooth {

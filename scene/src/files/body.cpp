@@ -1,7 +1,8 @@
-// Tether: bodies of a scene file. SPDX-License-Identifier: BSD-3-Clause
+// Tether: bodies in a scene file. SPDX-License-Identifier: BSD-3-Clause
 
 #include <cmath>
 
+#include "effects/list.hpp"
 #include "geometry/read_surface.hpp"
 #include "geometry/shape_type.hpp"
 #include "read.hpp"
@@ -149,22 +150,70 @@ void read_mass(Fields& in, Body& body) {
     in.missing("inertia", "that of the shapes is not a finite number > 0");
 }
 
+using Keys = std::vector<std::pair<std::string, std::string>>;
+
+Keys shape_keys(const Shape& shape) {
+  Keys keys{{"shape", toml_word(shape.kind)}};
+  for (const ShapeField& field : type_of(shape.kind).fields())
+    std::visit([&](auto member) { keys.emplace_back(field.key, toml(shape.*member)); },
+               field.value);
+  return keys;
+}
+
+bool at_origin(const Shape& shape) {
+  return shape.position.isZero(0) &&
+         shape.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs();
+}
+
+void write_shapes(const Body& body, Writer& out) {
+  if (body.shapes.size() == 1 && at_origin(body.shapes.front())) {
+    for (const auto& [key, value] : shape_keys(body.shapes.front())) out.raw(key, value);
+    return;
+  }
+  if (body.shapes.empty()) return;
+  std::string text = "[\n";
+  for (const Shape& shape : body.shapes) {
+    text += "  { ";
+    for (const auto& [key, value] : shape_keys(shape)) text += fmt::format("{} = {}, ", key, value);
+    text += fmt::format("position = {}, orientation = {} }},\n", toml(shape.position),
+                        toml(shape.orientation));
+  }
+  out.raw("shapes", text + "]");
+}
+
+void write_mass(const Body& body, Writer& out) {
+  const Matrix3d& J = body.inertia;
+  out.field("mass", body.mass, "kg");
+  if (!body.fixed || !J.isZero(0) || body.mass > 0)
+    out.field("inertia", std::vector<double>{J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2)},
+              "xx, yy, zz, xy, xz, yz; kg m^2, body axes");
+}
+
 }  // namespace
 
-Body read_body(Fields& in, Reader& r) {
-  Body body;
-  body.place = in.place();
-  body.name = in.name("name", in.path());
-  if (in.has("name")) in.rename(fmt::format("body \"{}\"", body.name));
-  body.fixed = in.flag("fixed", false);
-  body.shapes = read_shapes(in, r);
-  read_mass(in, body);
-  body.position = in.vector("position", Vector3d::Zero(), kAny, "m");
-  body.orientation = read_orientation(in, r);
-  body.velocity = in.vector("velocity", Vector3d::Zero(), kAny, "m/s");
-  body.angular_velocity = in.vector("angular_velocity", Vector3d::Zero(), kAny, "rad/s");
-  body.material = in.name("material", "");
-  return body;
+void body_fields(const Form& form, Body& body) {
+  Fields* const in = form.in();
+  form.name("body", body.name);
+  form.flag("fixed", body.fixed);
+  if (in) {
+    body.shapes = read_shapes(*in, *form.reader());
+    read_mass(*in, body);
+  } else {
+    write_shapes(body, *form.out());
+    write_mass(body, *form.out());
+  }
+  form.vector("position", body.position, kMetres);
+  if (in)
+    body.orientation = read_orientation(*in, *form.reader());
+  else
+    form.out()->field("orientation", body.orientation);
+  form.vector("velocity", body.velocity, kSpeed);
+  form.vector("angular_velocity", body.angular_velocity, kTurning);
+  if (in)
+    body.material = in->name("material", "");
+  else if (!body.material.empty())
+    form.out()->field("material", body.material);
+  for (const effects::Effect* each : effects::all()) each->body_fields(form, body);
 }
 
 }  // namespace tether::scene::files
