@@ -18,14 +18,15 @@ namespace {
 
 using linalg::at;
 
-constexpr double kUnsymmetric = 1e-2;  // of |M|: files of others keep six digits, or less
+// Relative to |M|. Problem files of other programs hold six digits or fewer.
+constexpr double kUnsymmetric = 1e-2;
 
 [[noreturn]] void fail(const std::string& what) { throw std::invalid_argument(what); }
 
 std::string block(int k) { return "block " + std::to_string(k) + ": "; }
 
 int rows_of(Cone::Kind kind) {
-  if (kind == Cone::Kind::free) return 0;  // as given
+  if (kind == Cone::Kind::free) return 0;  // any number
   const detail::ConeParts parts = detail::parts_of(kind);
   return 1 + parts.tangents + (parts.spin >= 0 ? 1 : 0) + (parts.rolling >= 0 ? 2 : 0);
 }
@@ -62,7 +63,7 @@ void check_entries(const char* matrix, const std::vector<MatrixEntry>& entries, 
   }
 }
 
-// Rows ascend, columns in each; equal positions are one.
+// Sorts entries by row, then by column, and adds up those of equal position.
 void compress(std::vector<MatrixEntry>& entries) {
   std::stable_sort(entries.begin(), entries.end(), [](const MatrixEntry& a, const MatrixEntry& b) {
     return a.row != b.row ? a.row < b.row : a.column < b.column;
@@ -122,7 +123,7 @@ double needed_change(const ConeProblem& problem, int block) {
   if (!(bn > 0)) return 0;
   const Matrix6d D = diagonal_block(problem, first, cone.rows);
   const ConeParts parts = parts_of(cone.kind);
-  // Change of velocity that each part may cause with the normal impulse b_n / A_nn.
+  // Largest change of velocity by friction or a moment, at the normal impulse b_n / A_nn.
   const auto part = [&](int from, int count, double length) {
     double bb = 0;
     for (int r = from; r < from + count; ++r) bb += b(r) * b(r);
@@ -137,11 +138,12 @@ double needed_change(const ConeProblem& problem, int block) {
 }
 
 void require_law(const ConeProblem& problem, Law law) {
-  name(law);  // one of laws()
+  name(law);  // throws where `law` is none of laws()
   if (law == Law::coulomb) return;
   for (std::size_t k = 0; k < problem.cones().size(); ++k) {
     const Cone::Kind kind = problem.cones()[k].kind;
-    // Maximum dissipation follows the contact's own block of A, which free rows change.
+    // Maximum dissipation depends on the contact's diagonal block of A, which the elimination of
+    // free rows changes.
     if (kind == Cone::Kind::bounded || kind >= Cone::Kind::torsional ||
         (kind == Cone::Kind::free && law == Law::maximum_dissipation))
       fail(block(static_cast<int>(k)) + "law = " + name(law) + ": " + name(kind) +
@@ -196,7 +198,7 @@ ConeProblem ConeProblem::sparse(const std::vector<MatrixEntry>& A, const linalg:
     out.entries_.push_back({static_cast<int>(r), static_cast<int>(r), compliance[r]});
   }
   compress(out.entries_);
-  check_entries("A", out.entries_, n, n);  // sums
+  check_entries("A", out.entries_, n, n);  // a sum of finite entries may overflow
   out.b_ = b;
   out.cones_ = std::move(cones);
   out.row_start_.assign(at(static_cast<int>(n) + 1), 0);
@@ -208,12 +210,12 @@ ConeProblem ConeProblem::sparse(const std::vector<MatrixEntry>& A, const linalg:
     const Cone& cone = out.cones_[k];
     const int first = out.first_[k];
     const bool one = cone.kind != Cone::Kind::free;
-    // Diagonal blocks; free rows one by one, which need no more than a diagonal.
+    // The block of a contact is scaled as a whole, free rows one by one.
     for (int row = first; row < first + cone.rows; row += one ? cone.rows : 1) {
       const Matrix6d D = detail::diagonal_block(out, row, one ? cone.rows : 1);
       if (detail::is_contact(cone.kind) && !(D(0, 0) > 0))
         detail::refuse(block(static_cast<int>(k)) + "A_nn", D(0, 0), "must be > 0");
-      // Rows of moments have units of their own: correlations say the same.
+      // Rows of forces and of moments differ in unit, so the block is tested with a unit diagonal.
       Vector6d root = Vector6d::Zero();
       for (int r = 0; r < 6; ++r) root[r] = D(r, r) > 0 ? 1 / std::sqrt(D(r, r)) : 1;
       detail::require_semidefinite(
@@ -255,7 +257,7 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
   detail::require_finite("bias", bias);
   check_entries("M", M, n, n);
   check_entries("J", J, m, n);
-  // Parts of M that hang together, numbered by their first column.
+  // Connected parts of M: M is factorised part by part.
   linalg::DisjointSets parts(n);
   for (const MatrixEntry& e : M)
     if (e.value != 0) parts.join(e.row, e.column);
@@ -282,7 +284,7 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
     const Eigen::SparseMatrix<double> other = Mk.transpose();
     const Eigen::SparseMatrix<double> half = Mk.triangularView<Eigen::StrictlyUpper>();
     const Eigen::SparseMatrix<double> below = Mk.triangularView<Eigen::StrictlyLower>();
-    if ((half.norm() == 0) != (below.norm() == 0)) {  // one half for both
+    if ((half.norm() == 0) != (below.norm() == 0)) {  // only one triangle was given
       Mk = (Mk + Eigen::SparseMatrix<double>((half + below).transpose())).eval();
     } else {
       if (!((Mk - other).norm() <= kUnsymmetric * Mk.norm())) refuse_part();
@@ -296,7 +298,8 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
         row_place[at(e.row)] = static_cast<int>(touched.size());
         touched.push_back(e.row);
       }
-    // A = E'E: symmetric, and small where it should vanish.
+    // A = E'E, E = L^-1 J' with M = L L', is symmetric to the last bit. Entries that should vanish
+    // are as small as rounding.
     Eigen::MatrixXd E =
         Eigen::MatrixXd::Zero(size[at(part)], static_cast<Eigen::Index>(touched.size()));
     for (const MatrixEntry& e : rows[at(part)])

@@ -6,9 +6,10 @@
 
 namespace tether::contact::detail {
 
-constexpr double kSlip = 1e-12;  // of what a velocity is the difference of: none
+// A velocity below this part of the terms whose difference it is counts as zero.
+constexpr double kSlip = 1e-12;
 
-/// Rows of a cone of contact, counted from its first: -1 where it has none.
+/// Places of the rows of a contact, counted from its normal; -1: it has no such row.
 struct ConeParts {
   int tangents = 0;             ///< rows 1 .. tangents
   int spin = -1, rolling = -1;  ///< moment about the normal; first of two across it
@@ -38,7 +39,8 @@ constexpr ConeParts parts_of(Cone::Kind kind) {
   return {};
 }
 
-/// f(first row, rows) of each part of a cone whose length has a bound: slip, moments, a motor.
+/// Calls f(first row, number of rows) for each part of a cone whose length is bounded: friction,
+/// moments, a motor.
 template <class F>
 void each_part(Cone::Kind kind, const F& f) {
   const ConeParts parts = parts_of(kind);
@@ -48,7 +50,7 @@ void each_part(Cone::Kind kind, const F& f) {
   if (parts.rolling >= 0) f(parts.rolling, 2);
 }
 
-/// The bound of that part at a normal impulse.
+/// Bound of the part that begins at row `from`, at a normal impulse.
 inline double bound_of(const Cone& cone, int from, double normal) {
   const ConeParts parts = parts_of(cone.kind);
   return from == 0               ? cone.bound
@@ -57,17 +59,17 @@ inline double bound_of(const Cone& cone, int from, double normal) {
                                  : cone.mu * normal;
 }
 
-/// A of `size` rows from `row`, the rest zero.
+/// Diagonal block of A: `size` rows from `row`; the rest of the result is zero.
 Matrix6d diagonal_block(const ConeProblem& problem, int row, int size);
 
-/// By block: the first block of its island, which entries of A that are not zero connect.
+/// For each block the first block of its island. Nonzero entries of A connect blocks.
 std::vector<int> islands(const ConeProblem& problem);
 
-/// Velocity that a block has to change on its own, times row_scale()
-/// (method, section 8).
+/// Velocity scale of a block (method, section 3): the change of velocity that its b demands, times
+/// row_scale().
 double needed_change(const ConeProblem& problem, int block);
 
-/// Throws std::invalid_argument unless `law` says something of every cone.
+/// Throws std::invalid_argument unless `law` is defined for every cone of the problem.
 void require_law(const ConeProblem& problem, Law law);
 
 }  // namespace tether::contact::detail

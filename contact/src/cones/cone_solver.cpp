@@ -15,11 +15,12 @@ using linalg::at;
 
 namespace {
 
-// Solves with a tolerance that the residual of the rows asks for, where that of the contacts, whose
-// scale is theirs after elimination, was too loose.
+// The contacts of the embedding have scales of their own, so a solution of them may leave a larger
+// residual in the rows. It is then solved again with a smaller tolerance, so often at most.
 constexpr int kTries = 3;
 
-// Islands in which nothing approaches have no impulses, however small those are that a start has.
+// Sets impulses of islands to zero in which no block needs any. A start may have small ones there,
+// which the relative tolerance of the island would not remove.
 Eigen::VectorXd without_idle(const ConeProblem& problem, Eigen::VectorXd x) {
   const std::vector<int> island = detail::islands(problem);
   std::vector<char> needs(island.size(), 0);

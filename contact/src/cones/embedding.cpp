@@ -14,7 +14,8 @@ namespace {
 
 using linalg::at;
 
-// A diagonal entry of 1 after elimination below which it is held; rounding of its sums is 1e-15.
+// Diagonal entries are 1 before free rows are eliminated. A row whose entry falls below this value
+// is held by the free rows. Rounding leaves about 1e-15.
 constexpr double kHeld = 1e-11;
 
 double mobility(const ConeProblem& problem, int row) {
@@ -42,7 +43,7 @@ Embedding::Embedding(const ConeProblem& problem, double tolerance, const std::ve
   assemble(problem, open);
 }
 
-// Rows that see each part of the free ones, ascending.
+// For each connected part of the free rows: the other rows that A couples to it, ascending.
 std::vector<std::vector<int>> Embedding::rows_seeing_parts() const {
   std::vector<std::vector<int>> seeing(at(free_.part_count()));
   const Eigen::SparseMatrix<double>& C = free_.coupling();
@@ -56,8 +57,8 @@ std::vector<std::vector<int>> Embedding::rows_seeing_parts() const {
   return seeing;
 }
 
-// Column k of each part, where it has so many, less what the free rows take; the columns of
-// different parts are solved together, each of length 1.
+// Adds column seeing[p][k] of -A_cf A_ff^-1 A_fc for every part p. Parts are independent, so that
+// one solve serves the k-th columns of all; each right-hand side has length 1 within its part.
 void Embedding::eliminate_columns(const ConeProblem& problem,
                                   const std::vector<std::vector<int>>& seeing, std::size_t k,
                                   std::vector<Eigen::Triplet<double>>& entries) const {
@@ -118,13 +119,13 @@ void Embedding::eliminate(const ConeProblem& problem) {
   b_ = b_.cwiseProduct(scale_).eval();
   A_.resize(n, n);
   A_.setFromTriplets(entries.begin(), entries.end());
-  // Rounding of the elimination is not symmetric.
+  // Rounding has made the Schur complement slightly unsymmetric.
   if (!free_.empty())
     A_ = (0.5 * (A_ + Eigen::SparseMatrix<double, Eigen::RowMajor>(A_.transpose()))).eval();
 }
 
-// Directions of slip, and moments, that the free rows hold: what rounding leaves of them would be
-// divided by what it leaves on the diagonal.
+// Clears rows and columns of A in directions of slip, and of moments, that the free rows hold.
+// There A is rounding, and a solver would divide rounding by rounding.
 void Embedding::clear_held(const ConeProblem& problem) {
   std::vector<Eigen::Triplet<double>> Q;
   bool any = false;
@@ -182,7 +183,8 @@ void Embedding::place_rows(const ConeProblem& problem, double tolerance) {
       const int contact = add(k, 1);
       put(0, contact, 1);
       main_[at(k)] = contact;
-      // Its normal presses no faster than the fastest block needs.
+      // The normal of a bounded block is no row of the problem. Its velocity stays below the
+      // largest velocity scale, so that it does not spoil relative errors.
       bounds_[at(k)] = {contact, (need_ > 0 && N > need_ ? need_ / N : 1) / scale_[first]};
       continue;
     }
@@ -251,7 +253,7 @@ void Embedding::assemble(const ConeProblem& problem, const std::vector<char>& op
       const double s = scale_[problem.first_row(k)], a = bounds_[at(k)].factor * s;
       value(0, i, 0) = a;
       b[3 * i] = a * cone.bound / s;
-    } else {  // moments: after the contact whose normal they share
+    } else {  // moments: their contact comes before them, so normal[contact] is known
       const int contact = main_[at(k)];
       value(0, i, 0) = normal[at(contact)];
       value(0, contact, 0) = -normal[at(contact)];

@@ -10,21 +10,21 @@
 
 namespace tether::contact::detail {
 
-/// Every row that is not free is a component of a contact, in units of row_scale(), others are
-/// directions of their own that no other row moves:
+/// Every row that is not free becomes a component of a contact, in units of row_scale(). Components
+/// (normal, tangent, tangent) that have no row are marked `own`; no other row couples to them:
 ///
 ///     nonnegative   (row, own, own), mu = 0
-///     bounded       (own, row, own), mu = 1; its normal is pressed with the bound, so x_n = bound
+///     bounded       (own, row, own), mu = 1; b_n of the own normal makes x_n = bound
 ///     planar        (row, row, own)
 ///     friction      (row, row, row)
-///     moments       (own, row, own) and (own, row, row), mu the length; w_n = a (x_n - x_n of the
-///                   contact), so that x_n is that of the contact: an unsymmetric row
+///     moments       (own, row, own) and (own, row, row), mu = length; w_n = a (x_n - x_n of the
+///                   contact) makes both x_n equal, and A unsymmetric
 ///
 /// Free rows are eliminated from the matrix of these rows: A_cc - A_cf A_ff^-1 A_fc.
 class Embedding {
  public:
-  /// `open`: by block, whether its contact is known to be open, so that the normals of its moments
-  /// must not be at their kink; empty: none.
+  /// `open`: for each block, 1 if its contact is known to be open; empty: none is. The normals of
+  /// its moments then get w_n > 0, since x_n = w_n = 0 would be a kink for derivatives.
   Embedding(const ConeProblem& problem, double tolerance, const std::vector<char>& open = {});
 
   const Problem& contacts() const { return contacts_; }
@@ -35,26 +35,26 @@ class Embedding {
   int main_contact(int block) const { return main_[static_cast<std::size_t>(block)]; }
 
   Eigen::VectorXd lift(const linalg::VectorView& impulses) const;
-  /// By row; free rows zero.
+  /// From components of contacts to rows of the problem; free rows are zero.
   Eigen::VectorXd lower(const linalg::VectorView& contacts) const {
     return raise_.transpose() * contacts;
   }
-  /// Transposed: a gradient by row as one by component of the contacts.
+  /// The transpose of lower(): from rows to components of contacts.
   Eigen::VectorXd raise(const linalg::VectorView& gradient) const { return raise_ * gradient; }
-  /// All of x: free rows answer to those of the cones, A_ff x_f = g_f - A_fc x_c.
+  /// Adds the free rows to those of the cones: A_ff x_f = g_f - A_fc x_c.
   Eigen::VectorXd complete(const Eigen::VectorXd& cones, const linalg::VectorView& g) const;
 
-  /// Change of the contacts' b for one of b, by row; of the bounds for `bounds` by block.
+  /// Change of the contacts' b that a change of the problem's b causes.
   Eigen::VectorXd lift_b(const linalg::VectorView& db) const;
-  /// Transposed.
+  /// The transpose of lift_b().
   Eigen::VectorXd lower_b(const linalg::VectorView& db3) const;
-  /// The contact whose b has the bound of a block, and its factor; contact -1: none.
+  /// A bound N of a block enters the contacts as b_n = factor N of this contact; -1: no bound.
   struct Bound {
     int contact = -1;
     double factor = 0;
   };
   Bound bound_of(int block) const { return bounds_[static_cast<std::size_t>(block)]; }
-  /// Contacts of the moments of a block (-1: none), and mu of each over its length.
+  /// Contacts of the moments of a block (-1: none). Their mu is `factor` times the length.
   struct Moments {
     int spin = -1, rolling = -1;
     double spin_factor = 0, rolling_factor = 0;
@@ -86,7 +86,7 @@ class Embedding {
   Problem contacts_;
 };
 
-/// The largest that a block needs, times row_scale(): what bounds are weighed by.
+/// The largest velocity scale of a block, times row_scale().
 double largest_need(const ConeProblem& problem);
 
 }  // namespace tether::contact::detail

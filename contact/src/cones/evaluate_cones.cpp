@@ -1,6 +1,6 @@
-// Tether: residuals of any answer to a problem over cones. SPDX-License-Identifier: BSD-3-Clause
+// Tether: residuals of any impulses for a problem over cones. SPDX-License-Identifier: BSD-3-Clause
 //
-// method, section 8. Independent of how the problem is solved: blocks as given.
+// method, sections 3 and 8. Shares nothing with the solver: it uses the blocks as they are given.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,7 +16,7 @@ namespace {
 
 using linalg::at;
 
-// |m| <= r, m opposes w: natural map of one part with mobility d.
+// Natural-map residual of the law |m| <= r, m opposes w, for a part with diagonal entry d of A.
 template <int N>
 double part_error(const Eigen::Matrix<double, N, 1>& m, const Eigen::Matrix<double, N, 1>& w,
                   double d, double r) {
@@ -26,7 +26,7 @@ double part_error(const Eigen::Matrix<double, N, 1>& m, const Eigen::Matrix<doub
   return d * (m - p).norm();
 }
 
-// Block k, with x and w in the units in which mobilities are 1.
+// Residual of block k. D, x and w are scaled so that D has a unit diagonal.
 double block_error(const ConeProblem& problem, Law law, int k, const Vector6d& x, const Vector6d& w,
                    const Matrix6d& D) {
   const Cone& cone = problem.cones()[at(k)];
@@ -61,7 +61,7 @@ double block_error(const ConeProblem& problem, Law law, int k, const Vector6d& x
   return most;
 }
 
-// By block: 1 / what the neediest block of its island needs.
+// For each block 1 / velocity scale of its island, which is the largest of its blocks.
 std::vector<double> inverse_scales(const ConeProblem& problem) {
   const int n = static_cast<int>(problem.cones().size());
   const std::vector<int> island = detail::islands(problem);
@@ -102,7 +102,7 @@ ConeResiduals evaluate(const ConeProblem& problem, Law law, const linalg::Vector
       const double scale = s[at(row)];
       rounding = std::max(rounding, detail::kRoundOff * sum * scale);
       if (cone.kind != Cone::Kind::free) continue;
-      // A row that nothing moves either holds or does not.
+      // A row of zeros has no scale: its equation holds exactly, or the error is infinite.
       const double lost = scale > 0 || w[row] == 0 ? std::abs(w[row]) * scale
                                                    : std::numeric_limits<double>::infinity();
       error = std::max(error, lost);

@@ -12,8 +12,8 @@ namespace {
 
 using linalg::at;
 
-// Singular values of a unit matrix above it are solved in a few steps; rounding makes 1e-16 over it
-// of directions that A does not see.
+// The shift eps of the proximal steps, for a matrix with a unit diagonal. Components with singular
+// values above it converge in a few steps. In the null space of A rounding grows to 1e-16 / eps.
 constexpr double kProximal = 1e-8;
 constexpr int kSteps = 40;
 

@@ -13,7 +13,7 @@ void Broadphase::build(const std::vector<Eigen::Vector3d>& centre,
   large_.clear();
   if (radius.empty()) return;
 
-  // Many balls of one size and a few that are larger than four times the median.
+  // Balls larger than four times the median are few; in the grid they would widen all cells.
   sorted_ = radius;
   const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_.size() / 2);
   std::nth_element(sorted_.begin(), middle, sorted_.end());
@@ -27,7 +27,8 @@ void Broadphase::build(const std::vector<Eigen::Vector3d>& centre,
     low = low.cwiseMin(centre[k]);
     high = high.cwiseMax(centre[k]);
   }
-  // 20 bits a direction; cells grow where something has flown far away.
+  // At most 1e6 cells in a direction, so that a coordinate has 20 bits: cells grow where a body has
+  // flown far away.
   const double extent = (high - low).maxCoeff();
   const double cell = std::max(2 * widest, extent / 1e6);
   const double inverse = cell > 0 ? 1 / cell : 0;
@@ -37,7 +38,7 @@ void Broadphase::build(const std::vector<Eigen::Vector3d>& centre,
       continue;
     }
     std::uint64_t key = 0;
-    // From 1, so that the cell before exists.
+    // Coordinates begin at 1, so that every cell has a predecessor.
     for (int d = 0; d < 3; ++d)
       key = (key << 21) + static_cast<std::uint64_t>((centre[k][d] - low[d]) * inverse) + 1;
     cells_.push_back({key, static_cast<int>(k)});

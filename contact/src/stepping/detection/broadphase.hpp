@@ -7,8 +7,9 @@
 
 namespace tether::contact::detail {
 
-/// Balls around shapes, as a sorted uniform grid. The cell is as wide as the largest ball of the
-/// common size; the few that are much larger are compared with all others.
+/// Finds overlapping pairs among the bounding spheres of shapes by a sorted uniform grid. Cells are
+/// as wide as the largest sphere of common size. The few that are much larger are compared with all
+/// others.
 class Broadphase {
  public:
   /// Visits each pair of balls that overlap once, in an order that depends on positions only.
@@ -28,8 +29,9 @@ class Broadphase {
       for (std::size_t l = k + 1; l < large_.size(); ++l) meet(large_[k], large_[l]);
       for (const Cell& c : cells_) meet(large_[k], c.ball);
     }
-    // Half of the neighbours: the rest of the own column of cells and four other columns. Keys
-    // ascend, so each column's window only moves on.
+    // Each pair of neighbouring cells is visited once: the following cells of the same column, and
+    // three cells in each of four neighbouring columns. Keys ascend, so that the window in each of
+    // these columns only moves forward.
     constexpr std::uint64_t kX = std::uint64_t{1} << 42, kY = std::uint64_t{1} << 21;
     const std::uint64_t column[4] = {kY, kX - kY, kX, kX + kY};
     std::size_t window[4] = {0, 0, 0, 0};
@@ -48,7 +50,7 @@ class Broadphase {
 
  private:
   struct Cell {
-    std::uint64_t key;  // x, y, z of the cell, 21 bits each
+    std::uint64_t key;  // x, y, z of the cell, 21 bits each, x first
     int ball;
   };
   void build(const std::vector<Eigen::Vector3d>& centre, const std::vector<double>& radius);

@@ -6,10 +6,10 @@
 
 namespace tether::contact::detail {
 
-/// The part of a polygon, or of a line between two corners, with inward . (x - on_plane) >= 0,
-/// corner by corner: keep(k), and cut(k, next, point, leaves) where the edge from corner k to the
-/// next one passes the plane. Signs and cuts are of the same two numbers, so that a cut lies
-/// between the ends of its edge however flat the edge lies in the plane.
+/// Cuts a polygon, or a line of two corners, to the half-space inward . (x - on_plane) >= 0. Calls
+/// keep(k) for each corner inside, and cut(k, next, point, leaves) where the edge from corner k to
+/// the next one passes the plane. Both follow from the same two distances, so that a cut lies
+/// between the ends of its edge even where the edge lies in the plane up to rounding.
 template <class Point, class Keep, class Cut>
 void cut_polygon(std::size_t corners, const Eigen::Vector3d& inward,
                  const Eigen::Vector3d& on_plane, const Point& point, const Keep& keep,

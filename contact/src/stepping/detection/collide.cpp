@@ -16,7 +16,7 @@ using Family = ShapeForm::Family;
 
 namespace {
 
-// Spheres of radii r1, r2 about the nearest points of two shapes.
+// Two balls with centres c1, c2; capsules pass the nearest points of their axes.
 void ball_ball(const Vector3d& c1, double r1, const Vector3d& c2, double r2, double margin,
                int feature, NearPoints& out) {
   const Vector3d d = c1 - c2;
@@ -29,17 +29,19 @@ void ball_ball(const Vector3d& c1, double r1, const Vector3d& c2, double r2, dou
 
 void sphere_on(const Shape& a, const Pose& A, const ShapeForm& of_b, const Shape& b, const Pose& B,
                double margin, NearPoints& out) {
-  // In the axes of the other: differences of world positions have no direction on its surface.
+  // Computed in the axes of the other shape. Near its surface a difference of world positions is
+  // rounding, and has no direction.
   const Nearest at = of_b.nearest(b, B.rotation.transpose() * (A.position - B.position));
   if (!(at.gap - a.radius < margin)) return;
   const Vector3d n = B.rotation * at.normal;
   out.add(A.position - a.radius * n, B.position + B.rotation * at.point, n, at.gap - a.radius, 0);
 }
 
-// Touching points, each by itself, against another shape; normals point to the points.
+// Each of the touching points against another shape. Normals point towards the points.
 void points_on(const Shape& points, const Pose& pose, const ShapeForm& other, const Shape& shape,
                const Pose& shape_pose, double margin, NearPoints& out) {
-  // To one of the two positions first: so the way between them loses nothing far from the origin.
+  // The difference of the two positions comes first, so that bodies far from the origin lose no
+  // digits.
   const Eigen::Matrix3d turn = shape_pose.rotation.transpose();
   const Vector3d between = pose.position - shape_pose.position;
   for (std::size_t k = 0; k < points.points.size(); ++k) {
@@ -51,7 +53,7 @@ void points_on(const Shape& points, const Pose& pose, const ShapeForm& other, co
   }
 }
 
-// Ellipsoids and cylinders against any shape with an inside (detection, 3).
+// Ellipsoids and cylinders against any solid shape (detection, section 3).
 void collide_convex(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
                     NearPoints& out) {
   const Vector3d origin = A.position;
@@ -80,7 +82,7 @@ Segment axis_of(const Shape& s, const Pose& P) {
   return {P.position - half, P.position + half};
 }
 
-// Near-parallel axes touch at two points: the ends of the part that they share.
+// Capsules with nearly parallel axes touch at two points, the ends of their common length.
 void capsule_capsule(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
                      NearPoints& out) {
   const Segment s = axis_of(a, A), t = axis_of(b, B);
@@ -102,7 +104,7 @@ void capsule_capsule(const Shape& a, const Pose& A, const Shape& b, const Pose& 
   }
 }
 
-// a of lower rank than b.
+// Requires that the rank of a is at most that of b.
 void collide_ordered(const Shape& a, const Pose& A, const Shape& b, const Pose& B, double margin,
                      NearPoints& out) {
   if (a.kind == ShapeKind::sphere && b.kind == ShapeKind::sphere)

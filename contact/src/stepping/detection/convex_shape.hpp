@@ -11,8 +11,8 @@
 
 namespace tether::contact::detail {
 
-/// The part of a surface that lies against a plane: a point, the ends of a line, or the corners of
-/// a face, counterclockwise seen from outside. `id` of a corner stays from step to step.
+/// The feature of a surface that faces a direction: a point, the ends of a line, or the corners of
+/// a face, counterclockwise seen from outside. The `id` of a corner is the same in every step.
 struct Flat {
   static constexpr int kMost = 32;
   int count = 0;
@@ -27,8 +27,8 @@ struct Flat {
   }
 };
 
-/// A shape with an inside at its pose, about a common origin, without the radius of balls and
-/// capsules: h(m) = max m . x is its support function.
+/// A solid shape at its pose, relative to a common origin, by its support function h(m) = max m .
+/// x. Balls and capsules are represented by their centre and axis; `round` is their radius.
 class ConvexShape {
  public:
   ConvexShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& about)
@@ -36,15 +36,15 @@ class ConvexShape {
     form_->begin(shape, *this);
     size = std::max(half.maxCoeff(), round);
   }
-  /// Three points, which must outlive this: never smaller than they are, however thin; `thick` is
-  /// the thickness of what they touch.
+  /// A triangle, whose points must outlive this object. `thick` is the thickness of the shape that
+  /// it is compared with; the triangle itself has none, and farthest() never shrinks it.
   ConvexShape(const std::vector<Eigen::Vector3d>& triangle, double thick)
       : points(&triangle), thickness(thick), whole(true), form_(&form(ShapeKind::convex)) {
     for (const Eigen::Vector3d& p : triangle) middle += p / 3;
     for (const Eigen::Vector3d& p : triangle) size = std::max(size, (p - middle).norm());
   }
 
-  /// Farthest point in direction m (any length) of the shape less a part of its thickness.
+  /// Farthest point in direction m (any length) of the shape, shrunk by `less` times its thickness.
   Eigen::Vector3d farthest(const Eigen::Vector3d& m, double less = 0) const {
     return origin + rotation * form_->farthest(*this, rotation.transpose() * m, less);
   }
@@ -52,13 +52,13 @@ class ConvexShape {
   Eigen::Matrix3d curvature(const Eigen::Vector3d& m) const {
     return rotation * form_->curvature(*this, rotation.transpose() * m) * rotation.transpose();
   }
-  /// Unit direction of the line that the surface holds across m, or zero: kinks of h at m. Sets
-  /// `face` to the normal of a face against m.
+  /// Kinks of h near m, within a tolerance in radian. Returns the unit direction of a straight line
+  /// of the surface at right angles to m, or zero; sets `face` to the normal of a face along m.
   Eigen::Vector3d line(const Eigen::Vector3d& m, double tolerance, Eigen::Vector3d& face) const {
     face.setZero();
     return form_->line(*this, m, tolerance, face);
   }
-  /// The feature against m, up to an angle or up to a height.
+  /// The feature that faces m: all that lies within kFlatAngle or within `height` of it.
   void flat(const Eigen::Vector3d& m, double height, Flat& out) const {
     out.count = 0;
     out.normal.setZero();
@@ -67,14 +67,13 @@ class ConvexShape {
   const Eigen::Vector3d& centre() const { return whole ? middle : origin; }
   Eigen::Vector3d axis(int k) const { return rotation.col(k); }
 
-  // As its form has set them: half of what it measures along its axes, the middle of the points of
-  // a hull.
+  // Set by ShapeForm::begin: half the extent along each axis, and the mean of the points of a hull.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(), half = Eigen::Vector3d::Zero(),
                   middle = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   const std::vector<Eigen::Vector3d>* points = nullptr;
   double round = 0, thickness = 0, size = 0;
-  bool whole = false;  // no part of the thickness is taken off
+  bool whole = false;  // farthest() ignores `less`
 
  private:
   const ShapeForm* form_;

@@ -15,10 +15,11 @@ using linalg::at;
 
 namespace {
 
-constexpr double kLow = 1e-6;  // above the lowest point
+// A contact this close to the lowest point, relative to the thickness, stands for it.
+constexpr double kLow = 1e-6;
 
-// Clips a line or a face to another face, seen along n; cuts have the identities of the edge and of
-// the side that cuts it.
+// Clips a line or a face to another face, both seen along n. The identity of a cut is made of the
+// edge and of the side that cuts it.
 void clip_to_face(const Flat& face, const Vector3d& n, Flat& subject) {
   const double turn = face.normal.dot(n) < 0 ? -1 : 1;
   for (int k = 0; k < face.count && subject.count > 0; ++k) {
@@ -37,7 +38,7 @@ void clip_to_face(const Flat& face, const Vector3d& n, Flat& subject) {
   }
 }
 
-// Points of `subject` over (or, for_a, of a under) the face of the other shape.
+// Contacts of the line or face `subject` with the face of the other shape.
 void over_face(const ConvexPair& pair, const Flat& face, Flat& subject, bool subject_is_a) {
   const Vector3d& n = pair.apart.normal;
   clip_to_face(face, n, subject);
@@ -52,7 +53,7 @@ void over_face(const ConvexPair& pair, const Flat& face, Flat& subject, bool sub
   }
 }
 
-// Lines against each other: the ends of what they share, or where they cross.
+// Contacts of two lines: the ends of their common length, or the point where they cross.
 void along_lines(const ConvexPair& pair, const Flat& s, const Flat& t) {
   const Vector3d& n = pair.apart.normal;
   const auto flatten = [&](const Vector3d& x) { return Vector3d(x - n.dot(x) * n); };
@@ -110,7 +111,8 @@ void manifold(const ConvexPair& pair, Flat& s, Flat& t) {
   }
   for (int k = before; k < pair.out.count; ++k)
     if (pair.out.point[at(k)].gap < pair.apart.gap + kLow * thickness) return;
-  // A point: of a surface without lines, else where the shapes are nearest.
+  // No contact so far is at the lowest point. It is the point of a round surface, else the point at
+  // which the shapes are nearest.
   Vector3d x = pair.apart.on_first;
   if (s.count == 1) x = s.point[0];
   if (s.count != 1 && t.count == 1) x = t.point[0];

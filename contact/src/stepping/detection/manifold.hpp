@@ -9,9 +9,10 @@
 
 namespace tether::contact::detail {
 
-constexpr double kHigh = 0.1;  // of the thickness: what may lie against a surface
+// Parts of a surface up to this height, relative to the thickness, may touch.
+constexpr double kHigh = 0.1;
 
-/// Both shapes of a pair about a common origin, and where their points go.
+/// Two shapes relative to a common origin, their separation, and the list that contacts go to.
 struct ConvexPair {
   const ConvexShape &a, &b;
   const Eigen::Vector3d& origin;
@@ -19,14 +20,13 @@ struct ConvexPair {
   double margin;
   NearPoints& out;
 
-  /// Up to which what lies against the normal may touch.
+  /// Parts of either surface within this distance along the normal may touch.
   double height() const;
-  /// Points of the shapes without their radius, on a line along the normal.
+  /// Adds a contact at `on_a`. `core_gap` is the gap along the normal without the radii of balls.
   void add(const Eigen::Vector3d& on_a, double core_gap, int feature) const;
 };
 
-/// All points at which the surfaces lie against each other across the normal, given what of each
-/// lies against it; clips these.
+/// Adds all contacts between the features s of a and t of b that face each other. Clips s and t.
 void manifold(const ConvexPair& pair, Flat& s, Flat& t);
 
 }  // namespace tether::contact::detail

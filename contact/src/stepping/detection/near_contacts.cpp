@@ -20,11 +20,11 @@ using linalg::at;
 
 bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
 
-// As contact_id has them.
+// Surfaces of a contact, from its identity; see contact_id.
 int first_surface(const PointContact& c) { return static_cast<int>(c.id >> 40); }
 int second_surface(const PointContact& c) { return static_cast<int>(c.id >> 16 & 0xffffff); }
 
-// World axes, at r from the centre of the body.
+// Velocity of a moving surface against its body, at r from the centre of the body, in world axes.
 Vector3d surface_velocity(const BodySet& bodies, const Surface& s, const Vector3d& r) {
   const linalg::Quaternion& q = bodies.orientation[at(s.body)];
   return q * s.velocity + (q * s.angular_velocity).cross(r);
@@ -100,8 +100,8 @@ void NearContacts::set_resting(const std::vector<char>& resting) {
     still_[k] = fixed_[k] != 0 || resting[at(surface(bounded_[k]).body)] != 0;
 }
 
-// Who meets whom by material and kind: refuses pairs that nobody serves, and makes the polyhedra
-// that pairs need.
+// Lists the kinds of shapes that can meet by their materials. Refuses pairs of kinds for which no
+// algorithm exists, and makes the polyhedra that the others need.
 void NearContacts::find_polyhedra(const BodySet& bodies) {
   struct Kind {
     ShapeKind kind;
@@ -120,7 +120,7 @@ void NearContacts::find_polyhedra(const BodySet& bodies) {
   }
   const auto meet = [&](Kind& a, Kind& b) {
     if (!(a.moves || b.moves)) return;
-    if (&a == &b && a.surfaces.size() < 2) return;  // one body alone meets nobody of its own kind
+    if (&a == &b && a.surfaces.size() < 2) return;  // a surface does not meet itself
     if (!has_collision(a.kind, b.kind))
       throw std::invalid_argument(std::string("contact of ") + name(a.kind) + " and " +
                                   name(b.kind) + " is not supported");
@@ -174,13 +174,13 @@ void NearContacts::place(const BodySet& bodies, double dt) {
   for (int k = 0; k < static_cast<int>(surfaces_.size()); ++k) set_pose(bodies, k);
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     centre_[k] = pose_[at(bounded_[k])].position;
-    // The size of the other shape decides what is near a mesh, as with planes.
+    // Meshes and planes add nothing to the margin: the size of the other shape decides.
     const double near = mesh_[at(bounded_[k])] < 0 ? near_part_ * reach_[k] : 0;
     ball_[k] = reach_[k] + near + way(bodies, k, dt);
   }
 }
 
-// That the bounded surface k covers at most.
+// Longest way of a point of bounded surface k in the step.
 double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const {
   const Surface& s = surface(bounded_[k]);
   const RigidBody& b = bodies.motion[at(s.body)];
@@ -188,7 +188,7 @@ double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const 
   return dt * (b.velocity.norm() + arm * b.angular_velocity.norm());
 }
 
-// Points of surfaces i and j, into near_.
+// Writes the near points of surfaces i and j into near_.
 void NearContacts::find_points(int i, int j, double margin) {
   const Shape &s = surface(i).shape, &t = surface(j).shape;
   const Pose &S = pose_[at(i)], &T = pose_[at(j)];
@@ -228,7 +228,8 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
     PointContact c;
     c.first = s.body;
     c.second = t.body;
-    // Centred spheres: along the normal to the last bit, however far from the origin.
+    // For a sphere about the centre of its body the arm is along the normal to the last bit, so
+    // that normal forces have no moment.
     c.r1 = centred_[at(i)] ? Vector3d(-(s.shape.radius + part * p.gap) * p.normal)
                            : Vector3d(p.on_first + half - bodies.position[at(s.body)]);
     c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
@@ -245,7 +246,8 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   }
 }
 
-// Pairs of bounded surfaces, or of one and a plane, that `use(first, second)` wants.
+// Adds contacts of all near pairs, of two bounded surfaces or of one and a plane, for which
+// use(first, second) is true.
 template <class Use>
 void NearContacts::pairs(const BodySet& bodies, StepContacts& out, const Use& use) {
   for (int p = 0; p < static_cast<int>(planes_.size()); ++p) {

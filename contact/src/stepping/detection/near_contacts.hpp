@@ -13,37 +13,37 @@
 
 namespace tether::contact::detail {
 
-/// Velocity of a at the contact against that of b.
+/// Velocity of body a relative to body b at the contact.
 Eigen::Vector3d relative_velocity(const RigidBody& a, const RigidBody& b,
                                   const PointContact& contact);
-/// Normal velocity of separation.
+/// Normal component of the relative velocity; > 0: the bodies separate.
 double normal_velocity(const std::vector<RigidBody>& motion, const PointContact& contact);
 
-/// Finds the points at which bodies are or, by their velocities, may come into contact in a step.
+/// Finds the points at which bodies touch, or may touch within a step at their velocities.
 class NearContacts {
  public:
   /// Throws std::invalid_argument; see Stepper.
   NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
                const std::vector<Meeting>& meetings, Law law, double near_part);
 
-  /// Fills points and gaps.
+  /// Fills the points and gaps of `out` with all contacts of a step of dt.
   void find(const BodySet& bodies, double dt, StepContacts& out);
 
-  /// After find(), with other velocities at the same places: adds points whose bodies were too slow
-  /// to reach each other and are no longer, if they would end the step deeper in each other than
-  /// near_part of their size. False: none.
+  /// After find(), when velocities have changed at the same positions: adds contacts of bodies that
+  /// now are fast enough to reach each other. A contact is added if the bodies would end the step
+  /// deeper in each other than near_part of their size. Returns whether any was.
   bool find_more(const BodySet& bodies, double dt, StepContacts& out);
 
-  /// After find(), which has found the contact: all points of its two surfaces where their bodies
-  /// are now.
+  /// After find() has found this contact: fills `out` with all contacts of its two surfaces at the
+  /// present positions of their bodies.
   void follow(const BodySet& bodies, const PointContact& contact, StepContacts& out);
 
-  /// Bodies that stay where they are, of each body: they meet only what moves.
+  /// For each body, 1 if it rests. Pairs of bodies that rest or are fixed are left out.
   void set_resting(const std::vector<char>& resting);
 
   const Surface& surface(int k) const { return surfaces_[static_cast<std::size_t>(k)]; }
   const Meeting& meeting(const PointContact& c) const;
-  /// Distance of the farthest point of its smaller shape from that shape's origin, m.
+  /// Reach of the smaller shape of a contact: distance of its farthest point from its origin, m.
   double size(const PointContact& c) const;
   bool any_restitution() const;
   bool any_rolling() const;
@@ -64,19 +64,20 @@ class NearContacts {
   Law law_;
   double near_part_;
   PolyhedraContacts polyhedra_;
-  std::vector<Polyhedron> polyhedron_;  // of each surface; empty: none is needed
-  std::vector<MeshContacts> meshes_;    // and of each surface its index there, or -1
-  std::vector<int> mesh_;
+  std::vector<Polyhedron> polyhedron_;  // of each surface; empty where none is needed
+  std::vector<MeshContacts> meshes_;
+  std::vector<int> mesh_;  // of each surface: its index in meshes_, or -1
   Broadphase broadphase_;
   std::vector<int> planes_, bounded_;  // surfaces
   std::vector<int> index_;             // of each surface: k in bounded_, or ~k in planes_
-  // For each surface: its pose; for each bounded one: reach with and without what it may move.
+  // For each surface.
   std::vector<Pose> pose_;
-  std::vector<char> centred_;  // a sphere about the centre of its body
-  std::vector<double> size_;   // of each surface: its reach, infinite for planes
+  std::vector<char> centred_;  // whether it is a sphere about the centre of its body
+  std::vector<double> size_;   // its reach, infinite for planes
+  // For each bounded surface.
   std::vector<double> reach_;
   std::vector<Eigen::Vector3d> centre_;
-  std::vector<double> ball_;
+  std::vector<double> ball_;  // reach, margin and way within the step
   std::vector<char> still_, fixed_, faster_;
   StepContacts more_;
   std::vector<std::uint64_t> known_;  // identities of contacts

@@ -1,10 +1,10 @@
 // Tether: the direction in which two convex shapes lie farthest apart. SPDX-License-Identifier:
 // BSD-3-Clause
 //
-// detection, 3. A first direction by the algorithm of Gilbert, Johnson and Keerthi (1988) on
-// shapes that are smaller by a part of their thickness, so that touching ones are apart; then
-// Newton's method for the stationary points of s(n) on the sphere, across the lines and faces that
-// hold it.
+// detection, section 3. The algorithm of Gilbert, Johnson and Keerthi (1988) gives a first
+// direction. It is applied to shapes that are shrunk by a part of their thickness, so that touching
+// shapes are apart. Newton's method then maximises s(n) on the sphere; where a line or a face makes
+// s not smooth, n is kept on that kink.
 #include "stepping/detection/nearest_directions.hpp"
 
 #include <algorithm>
@@ -20,20 +20,21 @@ using linalg::at;
 
 namespace {
 
-constexpr std::array<double, 4> kLess{0, 1e-3, 3e-2, 0.5};  // of the thickness
-constexpr double kApart = 1e-4;  // of the thickness: distances that still have a direction
-constexpr double kSnap = 1e-6;   // radian: along a line, against a face
+// By which parts of the thickness shapes are shrunk, in turn.
+constexpr std::array<double, 4> kLess{0, 1e-3, 3e-2, 0.5};
+constexpr double kApart = 1e-4;  // of the thickness: shorter distances are rounding
+constexpr double kSnap = 1e-6;   // radian: so near a kink n lies on it
 constexpr int kIterations = 100;
 
-// Points of a - b with those of a and b that they are the difference of, and their weights.
+// Points of the difference a - b, the points of a and of b that they are made of, and weights.
 struct Simplex {
   int count = 0;
   std::array<Vector3d, 4> y, a, b;
   std::array<double, 4> weight{};
 };
 
-// The point of least norm of the plane through the points `used`; false if a weight is not positive
-// or the points have no plane.
+// Point of least norm of the plane through the points `used`. False if one of its weights is not
+// positive, or the points do not span a plane.
 bool nearest_inside(const Simplex& s, const std::array<int, 4>& used, int count, Vector3d& v,
                     std::array<double, 4>& weight) {
   const Vector3d& p = s.y[at(used[0])];
@@ -77,7 +78,7 @@ bool nearest_inside(const Simplex& s, const std::array<int, 4>& used, int count,
   return true;
 }
 
-// Point of least norm of the hull of the simplex; drops what it does not need.
+// Point of least norm of the hull of the simplex. Points without weight are dropped.
 Vector3d reduce(Simplex& s) {
   Vector3d best = s.y[0];
   std::array<double, 4> weights{}, weight{};
@@ -106,7 +107,7 @@ Vector3d reduce(Simplex& s) {
   return best;
 }
 
-// Nearest points of the smaller shapes. Returns their distance, 0 if they overlap.
+// Nearest points of the shapes shrunk by `less`. Returns their distance, 0 if they overlap.
 double nearest_points(const ConvexShape& a, const ConvexShape& b, double less, Vector3d v,
                       Separation& out) {
   Simplex s;
@@ -126,7 +127,7 @@ double nearest_points(const ConvexShape& a, const ConvexShape& b, double less, V
     const Simplex all = s;
     const Vector3d next = reduce(s);
     if (s.count == 4 || next.isZero(0)) return 0;
-    if (!(next.squaredNorm() < before)) {  // rounding
+    if (!(next.squaredNorm() < before)) {  // no progress beyond rounding
       s = all;
       --s.count;
       break;
@@ -146,7 +147,8 @@ double nearest_points(const ConvexShape& a, const ConvexShape& b, double less, V
   return v.norm();
 }
 
-// One that is deep inside the other: the best of some directions, which bounds the depth.
+// For a shape deep inside another one: the best of a fixed set of directions. Its separation bounds
+// the depth.
 Vector3d way_out(const ConvexShape& a, const ConvexShape& b) {
   Vector3d best = Vector3d::UnitZ();
   double most = -std::numeric_limits<double>::infinity();
@@ -167,8 +169,9 @@ Vector3d way_out(const ConvexShape& a, const ConvexShape& b) {
   return best;
 }
 
-// Kinks that hold n: a face of one shape, or lines of both. Columns of T: directions in which n may
-// still turn.
+// Puts n onto a kink of s within the tolerance: the normal of a face, or a direction at right
+// angles to a line of one or both shapes. Returns the number of directions in which n may still
+// turn, and writes them to the columns of T.
 int hold(const ConvexShape& a, const ConvexShape& b, double tolerance, Vector3d& n,
          Eigen::Matrix<double, 3, 2>& T) {
   Vector3d face_a, face_b;
@@ -196,7 +199,7 @@ int hold(const ConvexShape& a, const ConvexShape& b, double tolerance, Vector3d&
   return 2;
 }
 
-// Newton's step for the largest s(n) in the directions in which n may still turn.
+// Newton's step towards the maximum of s in the `free` directions T.
 Vector3d newton_step(const ConvexShape& a, const ConvexShape& b, const Vector3d& n, int free,
                      const Eigen::Matrix<double, 3, 2>& T, double scale) {
   const Vector3d apart = a.farthest(-n) - b.farthest(n);
@@ -213,8 +216,8 @@ Vector3d newton_step(const ConvexShape& a, const ConvexShape& b, const Vector3d&
   return g.norm() > 0 ? Vector3d(0.1 / g.norm() * (T * g)) : Vector3d(Vector3d::Zero());
 }
 
-// Newton's method for the largest s(n); no step that makes it less. Where no step makes it more, n
-// is beside a kink: what is farther from it is tried as well.
+// Newton's method for the maximum of s; no step decreases it. Where no step increases it n is
+// beside a kink, so that kinks at growing distances are tried.
 Vector3d improve(const ConvexShape& a, const ConvexShape& b, Vector3d n) {
   double s = separation(a, b, n);
   const double scale = std::max(a.thickness, b.thickness);

@@ -6,7 +6,7 @@
 
 namespace tether::contact::detail {
 
-/// Unit normal from b to a, and points of both that are nearest to each other along it.
+/// Unit normal from b to a, and the points of both that are nearest to each other along it.
 struct Separation {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(), on_first = Eigen::Vector3d::Zero(),
                   on_second = Eigen::Vector3d::Zero();
@@ -16,7 +16,8 @@ struct Separation {
 /// s(n) = min over a of n.x - max over b of n.y: the gap along n.
 double separation(const ConvexShape& a, const ConvexShape& b, const Eigen::Vector3d& n);
 
-/// Direction of the largest separation (detection, 3). False: the gap is at least `margin`.
+/// Finds the direction of the largest separation (detection, section 3). Returns false if the gap
+/// is at least `margin`.
 bool find_separation(const ConvexShape& a, const ConvexShape& b, double margin, Separation& out);
 
 }  // namespace tether::contact::detail

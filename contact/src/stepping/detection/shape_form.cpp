@@ -1,4 +1,4 @@
-// Tether: what several kinds of shapes are made of. SPDX-License-Identifier: BSD-3-Clause
+// Tether: parts that several kinds of shapes share. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping/detection/shape_parts.hpp"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ static_assert(0
               "each kind has a file in the folder shapes");
 #undef SHAPE
 
-// Asked for every pair of bodies that are near.
+// Called for every pair of near bodies, hence a table.
 const ShapeForm& form(ShapeKind kind) {
   static const std::array forms = [] {
     std::array<const ShapeForm*, kShapeKinds.size()> all{};
@@ -85,8 +85,8 @@ Vector3d CorneredForm::line(const ConvexShape& s, const Vector3d& direction, dou
   return (flat.point[1] - flat.point[0]).normalized();
 }
 
-// Corners within `height` of the farthest one, in the order of the directions round m in which
-// they lie farthest: a hull needs no faces for it.
+// The corners within `height` of the farthest one, ordered around m. They are those that lie
+// farthest in some direction across m, so that no faces of the hull are needed.
 void CorneredForm::corners(const ConvexShape& s, const Vector3d& direction, double height,
                            Flat& out) const {
   const Vector3d m = s.rotation.transpose() * direction;
@@ -109,7 +109,7 @@ void CorneredForm::corners(const ConvexShape& s, const Vector3d& direction, doub
       far = u.dot(p);
       best = k;
     }
-    if (best < 0) continue;  // heights that are no numbers
+    if (best < 0) continue;  // the heights are NaN
     if (out.count > 0 && (out.id[at(out.count - 1)] == best || out.id[0] == best)) continue;
     out.add(s.origin + s.rotation * corner(s, best), best);
   }
@@ -123,7 +123,7 @@ void CorneredForm::corners(const ConvexShape& s, const Vector3d& direction, doub
     out.normal = area / length;
     return;
   }
-  // On a line: its ends.
+  // The corners lie on a line: only its ends count.
   int a = 0, b = 1;
   for (int k = 0; k < out.count; ++k)
     if ((out.point[at(k)] - out.point[at(a)]).squaredNorm() >
@@ -136,7 +136,8 @@ void CorneredForm::corners(const ConvexShape& s, const Vector3d& direction, doub
   out.add(q, j);
 }
 
-// Corners of several faces are none: less of the height then.
+// Corners that do not lie in one plane belong to several faces. The height is then reduced until
+// one face is left.
 void CorneredForm::flat(const ConvexShape& s, const Vector3d& direction, double height,
                         Flat& out) const {
   double h = std::max(height, kFlatAngle * s.thickness);

@@ -1,4 +1,4 @@
-// Tether: what detection knows of one kind of shape. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the interface of a kind of shape to detection. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <limits>
@@ -6,7 +6,8 @@
 
 namespace tether::contact::detail {
 
-constexpr double kFlatAngle = 0.05;  // radian: faces and lines up to here lie against each other
+// Faces and lines that are parallel up to this angle (radian) touch along their whole extent.
+constexpr double kFlatAngle = 0.05;
 
 class ConvexShape;
 struct Flat;
@@ -16,16 +17,16 @@ struct Polyhedron;
 struct Nearest {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();     ///< unit, out of the shape
-  double gap = std::numeric_limits<double>::infinity();  ///< along it; < 0: the point is inside
+  double gap = std::numeric_limits<double>::infinity();  ///< along the normal; < 0: inside
 };
 
-/// One for each kind of shape, in a file of its own: <kind>_form().
+/// Geometry of one kind of shape. Each kind has one object, <kind>_form(), in a file of its own.
 class ShapeForm {
  public:
   /// Decides by which algorithm two shapes meet.
   enum class Family : std::uint8_t { ball, polyhedron, curved, points, plane, mesh };
 
-  /// The shape of lower rank comes first where the points of two are found.
+  /// `rank` orders the two shapes of a pair: the lower one is the first argument of collide().
   ShapeForm(Family family, int rank) : family_(family), rank_(rank) {}
   virtual ~ShapeForm() = default;
   Family family() const { return family_; }
@@ -36,18 +37,18 @@ class ShapeForm {
   virtual void check(const Shape& shape) const = 0;
   /// Farthest point from its origin, infinite for planes.
   virtual double reach(const Shape& shape) const = 0;
-  /// Adds its points against the plane through a point across n.
+  /// Adds its contacts with the plane through `on_plane` with the normal n.
   virtual void on_plane(const Shape&, const Pose&, const Eigen::Vector3d& /*on_plane*/,
                         const Eigen::Vector3d& /*n*/, double /*margin*/, NearPoints&) const {}
-  /// Exact outside and inside (detection, 5); of a kind without it, none.
+  /// Nearest point of the surface, exact outside and inside (detection, section 5).
   virtual Nearest nearest(const Shape&, const Eigen::Vector3d&) const { return {}; }
   virtual bool has_nearest() const { return false; }
   virtual void make_polyhedron(const Shape&, Polyhedron&) const {}
 
-  // Shapes with an inside, see ConvexShape.
+  // Solid shapes implement the following members; ConvexShape documents them.
 
   virtual void begin(const Shape&, ConvexShape&) const {}
-  /// In the axes of the shape, as `m`.
+  /// m and the result are in the axes of the shape.
   virtual Eigen::Vector3d farthest(const ConvexShape&, const Eigen::Vector3d& /*m*/,
                                    double /*less*/) const {
     return Eigen::Vector3d::Zero();
@@ -59,7 +60,7 @@ class ShapeForm {
                                double /*tolerance*/, Eigen::Vector3d& /*face*/) const {
     return Eigen::Vector3d::Zero();
   }
-  /// By default the farthest point alone: round shapes.
+  /// By default the farthest point alone, as for round shapes.
   virtual void flat(const ConvexShape& shape, const Eigen::Vector3d& m, double height,
                     Flat& out) const;
 

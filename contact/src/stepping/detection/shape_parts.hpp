@@ -1,4 +1,4 @@
-// Tether: what several kinds of shapes are made of. SPDX-License-Identifier: BSD-3-Clause
+// Tether: parts that several kinds of shapes share. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,8 @@
 
 namespace tether::contact::detail {
 
-constexpr double kUpright = 1e-9;  // sine of a tilt without direction
+// A tilt whose sine is smaller is rounding: it has no direction.
+constexpr double kUpright = 1e-9;
 
 inline double signed_one(double x) { return x < 0 ? -1 : 1; }
 
@@ -20,13 +21,14 @@ inline void demand_positive(const Shape& shape, double x, const char* what) {
                                 " must be > 0 and finite");
 }
 
-/// As many finite points, not all at the origin.
+/// Throws std::invalid_argument unless there are at least so many finite points, not all at the
+/// origin.
 void check_points(const Shape& shape, std::size_t least);
 double reach_of_points(const Shape& shape);
 void points_on_plane(const Shape& shape, const Pose& pose, const Eigen::Vector3d& plane,
                      const Eigen::Vector3d& n, double margin, NearPoints& out);
 
-/// A point, or a ball about it, and a plane by a point of it and its normal.
+/// Adds the contact of a point p, or of a ball, with the plane through `plane` with the normal n.
 inline void point_plane(const Eigen::Vector3d& p, const Eigen::Vector3d& plane,
                         const Eigen::Vector3d& n, double margin, int feature, NearPoints& out) {
   const double gap = n.dot(p - plane);
@@ -39,7 +41,7 @@ inline void ball_plane(const Eigen::Vector3d& centre, double radius, const Eigen
     out.add(centre - radius * n, centre - distance * n, n, distance - radius, feature);
 }
 
-/// Nearest point of a ball about `centre`; its normal is `out` if the given point is the centre.
+/// Nearest point to p of the ball about `centre`. Its normal is `out` if p is the centre.
 inline Nearest on_ball(const Eigen::Vector3d& centre, double radius, const Eigen::Vector3d& p,
                        const Eigen::Vector3d& out) {
   const Eigen::Vector3d d = p - centre;

@@ -15,13 +15,13 @@ using linalg::at;
 
 namespace {
 
-constexpr double kBorder = 1e-10;  // of the longest edge: what is on the border is inside
-constexpr double kShallow = 1e-6;  // of the thickness: depths at which a face needs no proof
-constexpr double kLowest = 1e-9;   // of the thickness: heights that are the same
-constexpr double kSame = 1e-6;     // radian: directions that are the same
-constexpr std::size_t kMost = 48;  // corners of what is cut
+constexpr double kBorder = 1e-10;  // of the longest edge: a point so near the border is inside
+constexpr double kShallow = 1e-6;  // of the thickness: in such depths every face is a way out
+constexpr double kLowest = 1e-9;   // of the thickness: a smaller difference of heights is none
+constexpr double kSame = 1e-6;     // radian: a smaller angle between directions is none
+constexpr std::size_t kMost = 48;  // corners of a clipped polygon
 
-// Identity of a point by its features; the same from step to step.
+// Identity of a contact, made of its features, which is the same in every step.
 std::uint64_t key_of(std::uint64_t kind, int a, int b) {
   std::uint64_t x = kind;
   for (const int each : {a, b}) {
@@ -32,8 +32,8 @@ std::uint64_t key_of(std::uint64_t kind, int a, int b) {
 }
 enum Kind : std::uint64_t { kOverFace = 1, kOnEdge, kOnCorner, kTopEdge, kTopCorner };
 
-// A corner of what is left of a face or a line over a triangle; `edge`: of the triangle, that it
-// was cut at, or -1.
+// A corner of a face or line of the body after clipping to a triangle. `edge` is the edge of the
+// triangle at which it was cut, -1 for an original corner.
 struct Cut {
   Vector3d point;
   int id, edge;
@@ -103,12 +103,12 @@ void MeshContacts::collide(const Shape& a, const Pose& A, const Pose& mesh, doub
   }
 }
 
-// Over the face: the points with which the body would touch its plane. They are right where the
-// body is above, and below where the face is the nearest way out. Edges and corners count where
-// the surface is sharp.
+// Adds the contacts of one triangle (detection, section 4). The contacts of the body with the plane
+// of the face count if the body is above it, or if the face is the nearest way out. Edges and
+// corners count where the surface is sharp.
 void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
   const Vector3d &n = near.triangle.normal, &p = near.corner[0];
-  if (!(n.dot(p) < 0)) return;  // the middle of the body is behind
+  if (!(n.dot(p) < 0)) return;  // the middle of the body is behind the triangle
   const double thickness = body.convex.thickness;
   const double low = n.dot(body.convex.farthest(-n) - p) - body.convex.round;
   if (!(low < body.margin)) return;
@@ -139,8 +139,8 @@ void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
   if (sharp && face) cut_edges(body, near, low, out);
 }
 
-// Adds contacts with sharp edges and corners; `face`: the nearest way out is that of the face.
-// False: the body is farther than the margin.
+// Adds contacts with sharp edges and corners. Sets `face` if the nearest way out is across the
+// face. Returns false if the body is farther away than the margin.
 bool MeshContacts::separate(const Body& body, const Near& near, bool& face, NearPoints& out) {
   std::copy(near.corner.begin(), near.corner.end(), corners_.begin());
   const ConvexShape triangle(corners_, body.convex.thickness);
@@ -165,8 +165,8 @@ bool MeshContacts::separate(const Body& body, const Near& near, bool& face, Near
   return true;
 }
 
-// The feature of the triangle against n, if it is sharp and the surface stays below it: then no
-// other triangle is nearer.
+// Finds the feature of the triangle that faces n. Returns true if it is sharp and the surface
+// around it stays below the plane across n, so that no other triangle is nearer.
 bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
                           std::uint64_t& part) const {
   const TriangleMesh::Triangle& t = near.triangle;
@@ -189,8 +189,8 @@ bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
   return n.dot(way) <= kSame * way.norm();
 }
 
-// Points at which a face or a line of the body lies over a sharp edge or corner of the triangle;
-// its other cuts are inside the surface that the body lies on.
+// Adds the points at which a face or a line of the body passes over a sharp edge or corner of the
+// triangle. Cuts at other edges lie within the flat surface and are no contacts.
 void MeshContacts::cut_edges(const Body& body, const Near& near, double low, NearPoints& out) {
   const TriangleMesh::Triangle& t = near.triangle;
   const double height = std::min(body.margin - low, kHigh * body.convex.thickness);

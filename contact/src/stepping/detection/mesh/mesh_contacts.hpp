@@ -14,13 +14,13 @@
 
 namespace tether::contact::detail {
 
-/// Contacts of bodies with a mesh (detection, 4). Keeps its storage between bodies.
+/// Contacts of bodies with a mesh (detection, section 4). The storage is reused between bodies.
 class MeshContacts {
  public:
   explicit MeshContacts(const Shape& mesh);
 
-  /// Adds all points of shape a, which has an inside, with a gap below `margin`; normals point from
-  /// the mesh to a.
+  /// Adds all contacts of the solid shape a with a gap below `margin`. Normals point from the mesh
+  /// to a.
   void collide(const Shape& a, const Pose& pose_a, const Pose& mesh, double margin,
                NearPoints& out);
 

@@ -15,11 +15,11 @@ using linalg::at;
 
 namespace {
 
-constexpr double kFlat = 1e-9;     // radian: bends up to here are rounding
-constexpr double kNoArea = 1e-14;  // twice the area of a triangle over its longest edge squared
-constexpr double kBelow = 1e-7;    // radian: of a neighbour that may rise above a top
+constexpr double kFlat = 1e-9;     // radian: smaller bends between triangles are rounding
+constexpr double kNoArea = 1e-14;  // least ratio of twice the area to the longest edge squared
+constexpr double kBelow = 1e-7;    // radian: neighbours of a top may rise by this angle
 
-// Number of each point among those that differ.
+// Joins equal points: returns the index of each point in `different`.
 std::vector<int> welded(const std::vector<Vector3d>& points, std::vector<Vector3d>& different) {
   std::vector<int> order(points.size()), number(points.size());
   std::iota(order.begin(), order.end(), 0);
@@ -90,7 +90,7 @@ void TriangleMesh::join_edges() {
     while (end < halves.size() && halves[end].low == halves[first].low &&
            halves[end].high == halves[first].high)
       triangles_[at(halves[end].triangle)].edge[at(halves[end].side)] = number, ++end;
-    // More than two, or two of opposite sides: each ends here.
+    // More than two triangles at an edge, or two with opposite orientation, are not joined.
     const HalfEdge &h = halves[first], &o = halves[end - 1];
     Triangle &s = triangles_[at(h.triangle)], &t = triangles_[at(o.triangle)];
     if (end != first + 2 || s.corner[at(h.side)] == t.corner[at(o.side)]) continue;

@@ -7,18 +7,18 @@
 
 namespace tether::contact::detail {
 
-/// Triangles whose corners are counterclockwise from the side on which bodies are. Corners that
-/// are equal to the last bit are one; triangles without an area touch nothing.
+/// Triangles whose corners run counterclockwise seen from the side of the bodies. Corners that are
+/// equal to the last bit are joined. Triangles without an area touch nothing.
 class TriangleMesh {
  public:
-  /// An edge is sharp where the surface bends away from bodies by more than rounding, and where it
-  /// ends: only there an edge touches what no triangle touches.
+  /// An edge is sharp where the surface bends away from the bodies by more than rounding, or ends.
+  /// Only a sharp edge can touch a body that none of its triangles touches.
   struct Triangle {
     std::array<int, 3> corner;
     std::array<int, 3> edge;  // from corner k to the next one: its number in the mesh
     std::array<int, 3> apex;  // corner across that edge; -1: none
     std::array<char, 3> sharp_edge, sharp_corner;
-    int patch = 0;  // the same for triangles that go on in one plane
+    int patch = 0;  // the same for connected triangles of one plane
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     bool sharp() const;  // some edge or corner is
   };

@@ -21,7 +21,7 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh) {
   if (!all.empty()) add(all, 0, all.size(), boxes);
 }
 
-// In halves along the longest extent of the middles: the depth is the logarithm of the number.
+// Halves the triangles along the longest extent of their centres, so that the tree is balanced.
 void TriangleTree::add(std::vector<int>& all, std::size_t begin, std::size_t end,
                        const std::vector<AlignedBox3d>& boxes) {
   const std::size_t own = nodes_.size();

@@ -8,15 +8,15 @@
 
 namespace tether::contact::detail {
 
-/// Boxes around triangles, around pairs of these boxes, and so on.
+/// A binary tree of bounding boxes of triangles.
 class TriangleTree {
  public:
   explicit TriangleTree(const TriangleMesh& mesh);
 
-  /// Visits triangles whose boxes meet `box`, in an order of the tree's own.
+  /// Visits the triangles whose bounding boxes meet `box`, in the order of the tree.
   template <class Visit>
   void near(const Eigen::AlignedBox3d& box, const Visit& visit) const {
-    // A node that is missed leads to the one after all of its own.
+    // The whole subtree of a node that does not meet the box is skipped.
     for (std::size_t k = 0; k < nodes_.size();) {
       const Node& node = nodes_[k];
       const bool meets = node.box.intersects(box);
@@ -29,7 +29,7 @@ class TriangleTree {
   struct Node {
     Eigen::AlignedBox3d box;
     int triangle = -1;     // of a leaf
-    std::size_t next = 0;  // behind all below this one
+    std::size_t next = 0;  // the node after the subtree of this one
   };
   void add(std::vector<int>& all, std::size_t begin, std::size_t end,
            const std::vector<Eigen::AlignedBox3d>& boxes);

@@ -23,8 +23,8 @@ void nearest(const Vector3d& p, const Vector3d& u, const Vector3d& q, const Vect
   on_second = q + t * v;
 }
 
-// Segments that pass each other beside their ends are as far apart as their nearest points, which
-// is farther than along the product of their directions.
+// The nearest points of two edges may be ends of these. Their distance is then larger than the
+// separation along the product of the edges, and is the gap.
 void crossing_edges(const Placed& a, const Placed& b, const EdgeAxis& E, double tie, double margin,
                     NearPoints& out) {
   const Polyhedron::Edge& e = a.shape->edges[at(E.first)];
@@ -44,8 +44,8 @@ void crossing_edges(const Placed& a, const Placed& b, const EdgeAxis& E, double 
 
 namespace {
 
-// The edge of `a` that is farthest in direction m: from the farthest vertex along the edge that
-// lies most across m. A vertex alone (from == to) where none does.
+// The edge of `a` that is farthest in direction m: among the edges of the farthest vertex the one
+// most nearly at right angles to m. If none is within kFlatAngle, the vertex alone (from == to).
 Polyhedron::Edge farthest(const Placed& a, const Vector3d& m, double rounding) {
   int v = 0;
   for (int k = 1; k < static_cast<int>(a.now.vertices.size()); ++k)
@@ -81,16 +81,17 @@ void edge_along_edge(const Placed& a, const Placed& b, const Vector3d& m, double
     if (vv > 0) y = q + std::clamp(v.dot(p - q) / vv, 0.0, 1.0) * v;
     return add(x, y, 0x7f00);
   }
-  // Edges that cross seen along m touch where they do; an angle in a plane with m opens a gap.
+  // Edges that cross in the view along m touch where they cross. An angle between them in a plane
+  // that contains m does not count as crossing.
   if (std::abs(m.dot(u.cross(v))) > 1e-3 * std::sqrt(uu * vv)) {
     Vector3d x, y;
     nearest(p, u, q, v, x, y);
     return add(x, y, 0x7f01);
   }
-  // Ends of the overlap of the edges, by their places along the first.
+  // Parallel edges touch at the ends of their overlap, given here by positions along the first one.
   const double from = std::max(0.0, std::min(u.dot(q - p), u.dot(q + v - p)) / uu);
   const double to = std::min(1.0, std::max(u.dot(q - p), u.dot(q + v - p)) / uu);
-  if (from > to) {  // one beyond the other: end to end
+  if (from > to) {  // no overlap: the nearest ends
     Vector3d x, y;
     nearest(p, u, q, v, x, y);
     return add(x, y, 0x7f01);

@@ -5,14 +5,15 @@
 
 namespace tether::contact::detail {
 
-// Nearest points of two segments from p along u and from q along v.
+// Nearest points of the segments p .. p + u and q .. q + v.
 void nearest(const Eigen::Vector3d& p, const Eigen::Vector3d& u, const Eigen::Vector3d& q,
              const Eigen::Vector3d& v, Eigen::Vector3d& on_first, Eigen::Vector3d& on_second);
 
-// Points of the two edges of an axis. tie: points nearer to the axis than this are on it.
+// Contact of the two edges of an axis. A distance from the axis below `tie` is rounding.
 void crossing_edges(const Placed& a, const Placed& b, const EdgeAxis& axis, double tie,
                     double margin, NearPoints& out);
-// Points of the edges (or corners) farthest in the unit direction m, which points from `a` to `b`.
+// Contacts of the edges or corners that are farthest along the unit vector m, which points from a
+// to b.
 void edge_along_edge(const Placed& a, const Placed& b, const Eigen::Vector3d& m, double rounding,
                      double margin, NearPoints& out);
 

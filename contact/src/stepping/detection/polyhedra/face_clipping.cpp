@@ -13,14 +13,14 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSame = 1e-7;  // of the smaller thickness: corners this near are one
+constexpr double kSame = 1e-7;  // of the smaller thickness: nearer corners count as one
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-// Among the faces farthest along -n, the one most nearly perpendicular to n. A face that lies
-// more against n may still end above the lowest corner. `same` may be lost beside a height; no face
-// (-1) where heights are no numbers.
+// Among the faces that contain a lowest corner along n, the one whose normal is nearest to -n. A
+// face with a better normal may end above the lowest corner and would not touch. Returns -1 where
+// heights are NaN.
 int FaceClipper::lowest_face(const Placed& other, const Vector3d& n, double same) {
   double lowest = kInfinity;
   height_.clear();
@@ -51,7 +51,7 @@ void FaceClipper::clip(const Placed& reference, int face, const Placed& other, d
   const int opposite = lowest_face(other, n, same);
   polygon_.clear();
   if (opposite < 0) return;
-  // Loops run the other way round seen from the reference face; either way serves.
+  // Seen from the reference face this loop runs clockwise, which clipping does not mind.
   for (int k = 0; k < other.loop_size(opposite); ++k) {
     const int v = other.loop(opposite)[at(k)];
     polygon_.push_back({other.vertex(v), v & 0x7ff, k});
@@ -65,7 +65,8 @@ void FaceClipper::clip(const Placed& reference, int face, const Placed& other, d
   }
 }
 
-// A cut within `same` of a corner takes over its feature: faces of equal size do not flicker.
+// A cut within `same` of a corner gets the feature of the corner. Otherwise the identities of
+// contacts between faces of equal size would change with rounding.
 void FaceClipper::clip_to(const Vector3d& inward, const Vector3d& on_plane, int plane,
                           double same) {
   clipped_.clear();
@@ -77,14 +78,15 @@ void FaceClipper::clip_to(const Vector3d& inward, const Vector3d& on_plane, int 
         int feature = 2048 + (polygon_[k].edge * 181 + plane) % 30000;
         for (const Corner* end : {&polygon_[k], &polygon_[next]})
           if ((x - end->point).squaredNorm() < same * same) feature = end->feature;
-        // Going out, the side plane follows; coming in, the rest of the edge.
+        // After a cut that leaves the half-space the polygon follows the side plane, else the rest
+        // of the edge.
         clipped_.push_back({x, feature, leaves ? 128 + plane : polygon_[k].edge});
       });
   polygon_.swap(clipped_);
 }
 
-// Leaves out corners within `same` of another one or of the line between their neighbours: what
-// is left spans the polygon up to that, and no point is moved.
+// Removes corners within `same` of another corner, or of the line between their neighbours. The
+// rest spans the same polygon up to `same`; no point is moved.
 void FaceClipper::merge(double same) {
   const auto spare = [&](std::size_t k) {
     const std::size_t n = polygon_.size();

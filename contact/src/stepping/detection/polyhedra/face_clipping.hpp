@@ -7,17 +7,17 @@
 
 namespace tether::contact::detail {
 
-// Keeps its storage between pairs of bodies.
+// Clips faces to faces. The storage is reused between pairs of bodies.
 class FaceClipper {
  public:
-  // Points on faces of `other` over the reference face, with gaps between `least` and `margin`;
-  // on_first of a result is on `other`, its normal is that of the reference face. size: the smaller
-  // thickness of both, mark: is put to the features.
+  // Adds the points of `other` over the reference face with gaps between `least` and `margin`.
+  // on_first of a result lies on `other`; the normal is that of the reference face. `size` is the
+  // smaller thickness of both; `mark` is added to the features.
   void clip(const Placed& reference, int face, const Placed& other, double least, double margin,
             double size, int mark, NearPoints& out);
 
  private:
-  // A corner of the polygon that is being clipped; `edge` follows it.
+  // A corner of the polygon that is being clipped; `edge` is the edge from it to the next corner.
   struct Corner {
     Eigen::Vector3d point;
     int feature, edge;

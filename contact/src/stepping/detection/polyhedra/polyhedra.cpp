@@ -14,10 +14,11 @@ using Eigen::Vector3d;
 
 namespace {
 
-// Part of the smaller thickness: separations between which faces are preferred.
+// A face is preferred to a pair of edges whose separation is larger by less than this part of the
+// smaller thickness.
 constexpr double kTie = 1e-4;
 
-// About a common origin.
+// Sets `to` to a polyhedron at its pose, relative to a common origin.
 void place(const Polyhedron& shape, const Pose& pose, const Vector3d& origin, Placed& to) {
   to.shape = &shape;
   to.rotation = pose.rotation;
@@ -73,27 +74,28 @@ void PolyhedraContacts::polyhedra(double margin, NearPoints& out) {
   if (A.separation >= margin) return;
   const FaceAxis B = best_face(b_, a_, rounding);
   if (B.separation >= margin) return;
-  if (A.face < 0 || B.face < 0) return;  // places that are no numbers: the step says so
+  if (A.face < 0 || B.face < 0) return;  // positions are NaN, which the step reports
   const EdgeAxis E = best_edges(a_, b_, rounding);
   if (E.separation >= margin) return;
   const double best = std::max(A.separation, B.separation);
   if (E.separation > best + tie) {
     const int before = out.count;
     crossing_edges(a_, b_, E, tie, margin, out);
-    // One point leaves bodies free to turn about it: what may close meanwhile is open now.
+    // The bodies may turn about a single point within the step. Points over the face that are
+    // still open may close then, so they are added.
     if (out.count > before) over_face(A, B, tie, margin, size, 0, out);
     return;
   }
   const Vector3d &nA = a_.face(A.face).normal, &nB = b_.face(B.face).normal;
-  // Faces more oblique than kFlatAngle to each other have an edge contact between them.
+  // Both faces separate equally well but are oblique to each other: edges touch.
   if (std::abs(A.separation - B.separation) < tie &&
       -nA.dot(nB) < 1 - 0.5 * kFlatAngle * kFlatAngle)
     return edge_along_edge(a_, b_, (nA - nB).normalized(), rounding, margin, out);
   over_face(A, B, tie, margin, size, -std::numeric_limits<double>::infinity(), out);
 }
 
-// The first body's face unless the second one's is clearly better, so that touching faces keep
-// their reference.
+// The reference is the face of the first body unless that of the second one is clearly better, so
+// that it does not alternate between touching faces.
 void PolyhedraContacts::over_face(const FaceAxis& A, const FaceAxis& B, double tie, double margin,
                                   double size, double least, NearPoints& out) {
   if (A.separation >= B.separation - tie) {

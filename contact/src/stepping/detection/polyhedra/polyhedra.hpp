@@ -8,24 +8,24 @@ namespace tether::contact::detail {
 
 inline bool is_polyhedron(ShapeKind k) { return form(k).family() == ShapeForm::Family::polyhedron; }
 
-/// Boxes and convex hulls against each other, capsules against both, spheres and points against
-/// those whose nearest point has no formula.
+/// Whether PolyhedraContacts serves this pair: boxes and hulls against each other, capsules against
+/// both, spheres and points against hulls, whose nearest point has no formula.
 bool meet_as_polyhedra(ShapeKind a, ShapeKind b);
 
-/// Their points. Keeps its storage between pairs.
+/// Contacts of such pairs. The storage is reused between pairs.
 ///
-/// Touching faces are found to round-off and without any margin or skin: the separating axis is
-/// chosen among all face normals and edge products (detection, 2), then the face that lies
-/// against the reference face is clipped to it.
+/// The separating axis is chosen among all face normals and edge products (detection, section 2).
+/// The face opposite to the reference face is then clipped to it. Touching faces are found to
+/// rounding, without any margin or skin.
 ///
-/// Normals. A face gives its normal. Crossing edges: their product. Where an edge lies along an
-/// edge (or a corner on one) and the faces of both bodies separate them equally well, there is no
-/// unique normal: it is the mean of the two faces' (cards that lean against each other by their top
-/// edges: horizontal).
+/// The normal is that of the reference face, or the product of crossing edges. Where an edge lies
+/// along an edge, or a corner on one, and the faces of both bodies separate equally well, no normal
+/// is distinguished. It is then the mean of the normals of the two faces: horizontal for two cards
+/// that lean against each other.
 class PolyhedraContacts {
  public:
-  /// Adds all points with a gap below `margin`; normals point from b to a. The polyhedra are those
-  /// of the shapes that are such.
+  /// Adds all contacts with a gap below `margin`; normals point from b to a. `of_a` and `of_b` are
+  /// the polyhedra of boxes and hulls, ignored for other shapes.
   void collide(const Shape& a, const Polyhedron& of_a, const Pose& A, const Shape& b,
                const Polyhedron& of_b, const Pose& B, double margin, NearPoints& out);
 

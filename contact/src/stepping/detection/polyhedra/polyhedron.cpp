@@ -17,7 +17,7 @@ using linalg::at;
 
 namespace {
 
-// Newell's normal of a closed loop: twice its area long.
+// Newell's normal of a closed loop; its length is twice the area.
 Vector3d newell(const std::vector<Vector3d>& vertices, const std::vector<int>& loop) {
   Vector3d sum = Vector3d::Zero();
   const Vector3d& origin = vertices[at(loop[0])];

@@ -8,8 +8,8 @@
 
 namespace tether::contact::detail {
 
-// Part of the smaller thickness: numbers that differ by rounding only, of which the first is taken
-// in every attitude.
+// Lengths that differ by less than this part of the smaller thickness are equal. The first of equal
+// candidates is taken, so that the choice does not change with the attitude.
 constexpr double kEqual = 1e-12;
 
 struct Polyhedron {
@@ -31,7 +31,7 @@ struct Polyhedron {
 /// The polyhedron of a box or a convex shape. Throws std::invalid_argument if the points are flat.
 Polyhedron make_polyhedron(const Shape& shape);
 
-/// The same at a pose, into storage that is used again.
+/// Writes the polyhedron at a pose, relative to `origin`, into `to`.
 void place(const Polyhedron& from, const Pose& pose, const Eigen::Vector3d& origin, Polyhedron& to);
 
 }  // namespace tether::contact::detail

@@ -12,10 +12,10 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double kFlat = 1e-9;  // radian: along a face
+constexpr double kFlat = 1e-9;  // radian: an axis within this angle lies along a face
 
-// The point of the polyhedron nearest to c, the outward direction there, and the distance
-// (negative inside).
+// Finds the point of the surface nearest to c and the outward normal there. Returns the distance,
+// negative inside.
 double nearest_point(const Placed& b, const Vector3d& c, Vector3d& point, Vector3d& normal) {
   int best = 0;
   double height = -std::numeric_limits<double>::infinity();
@@ -45,7 +45,8 @@ double nearest_point(const Placed& b, const Vector3d& c, Vector3d& point, Vector
       point = x;
     }
   }
-  // On the surface to rounding the difference has no direction.
+  // If c is on the surface up to rounding the difference has no direction: the normal of the face
+  // stays.
   if (least > kEqual * b.now.size) normal = (c - point) / least;
   return least;
 }
@@ -84,8 +85,8 @@ void round_on_polyhedron(const Round& round, const Placed& b, double margin, Nea
     const double distance = n.norm();
     if (!(distance > 0) || distance - round.radius >= margin) continue;
     n /= distance;
-    // Nearest to the edge from outside: between the normals of its faces, or along one of them
-    // where the capsule lies flat on a face and reaches beyond it.
+    // The edge is nearest if the direction to the axis lies between the normals of its faces. It
+    // may coincide with one of them where the capsule lies flat on a face and reaches beyond it.
     const double slack = kFlat * v.norm();
     const double left = n.dot(b.face(e.left).normal.cross(v));
     const double right = n.dot(b.face(e.right).normal.cross(v));

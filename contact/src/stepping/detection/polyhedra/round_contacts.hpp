@@ -12,11 +12,12 @@ struct Round {
   bool capsule;
 };
 
-// Both ends of a capsule as balls, and where its axis passes an edge between them.
+// Adds contacts of a ball, or of both ends of a capsule and of the points at which its axis passes
+// an edge between them.
 void round_on_polyhedron(const Round& round, const Placed& polyhedron, double margin,
                          NearPoints& out);
 
-/// Each point by itself; `pose` is about the same origin as the polyhedron.
+/// Adds contacts of single points; `pose` has the same origin as the polyhedron.
 void points_on_polyhedron(const std::vector<Eigen::Vector3d>& points, const Pose& pose,
                           const Placed& polyhedron, double margin, NearPoints& out);
 

@@ -20,8 +20,8 @@ FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
   return best;
 }
 
-// Only edges whose arcs of normals cross can touch (Gregorius, The Separating Axis Test between
-// Convex Polyhedra, 2013).
+// An edge is an arc between the normals of its faces on the Gauss sphere. Only edges whose arcs
+// cross can touch (Gregorius, The Separating Axis Test between Convex Polyhedra, 2013).
 EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
   EdgeAxis best;
   for (int i = 0; i < static_cast<int>(a.shape->edges.size()); ++i) {

@@ -10,7 +10,8 @@
 
 namespace tether::contact::detail {
 
-// A body at its pose: shared topology, own coordinates (world axes, about a common origin).
+// A polyhedron at its pose: `shape` has the topology, `now` the coordinates in world axes relative
+// to a common origin.
 struct Placed {
   const Polyhedron* shape;
   Polyhedron now;
@@ -22,8 +23,8 @@ struct Placed {
   const Eigen::Vector3d& corner(int f, int k) const {
     return vertex(loop(f)[linalg::at(k < loop_size(f) ? k : k - loop_size(f))]);
   }
-  // Into the face from its edge k. From the shape's own coordinates: those of a pose are rounded to
-  // the distance from the common origin, and a short edge would turn by that.
+  // Direction from edge k into face f. It is computed in the axes of the shape: coordinates at a
+  // pose are rounded relative to the distance from the origin, which would turn short edges.
   Eigen::Vector3d inward(int f, int k) const {
     const int next = k + 1 < loop_size(f) ? k + 1 : 0;
     const std::vector<Eigen::Vector3d>& v = shape->vertices;
@@ -44,10 +45,10 @@ struct EdgeAxis {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // from the first body to the second
 };
 
-// The face of `a` beyond whose plane all of `b` lies farthest. rounding: separations that differ by
-// less are equal, and the first is taken in every attitude.
+// The face of a with the largest separation from b. Separations that differ by less than `rounding`
+// are equal, and the first face is taken.
 FaceAxis best_face(const Placed& a, const Placed& b, double rounding);
-// The same with the products of their edges.
+// The pair of edges whose product has the largest separation.
 EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding);
 
 }  // namespace tether::contact::detail

@@ -22,7 +22,7 @@ namespace {
 constexpr int kRim = 8;  // points of a rim
 constexpr int kSide = 2 * kRim;
 
-// As of a rectangle: distance from the axis, place along it.
+// Nearest point in the half-plane through the axis: a cylinder is a rectangle there.
 Nearest nearest_on(double radius, double half, const Vector3d& p) {
   const double across = std::hypot(p.x(), p.y());
   const Vector3d way =
@@ -46,8 +46,8 @@ class CylinderForm final : public ShapeForm {
     demand_positive(s, s.length, "length");
   }
   double reach(const Shape& s) const override { return std::hypot(s.radius, 0.5 * s.length); }
-  // The lowest points of both rims, and three more of the lower one: a standing cylinder has four.
-  // They turn with the tilt, so that the rim on which it tips is always among them.
+  // Contacts are the lowest points of both rims and three more of the lower rim, so that a standing
+  // cylinder has four. They turn with the tilt: the point over which it tips is always among them.
   void on_plane(const Shape& s, const Pose& pose, const Vector3d& plane, const Vector3d& n,
                 double margin, NearPoints& out) const override {
     const Vector3d z = pose.rotation.col(2);

@@ -20,7 +20,8 @@ namespace {
 // The nearest point x has p - x = t x / a^2 (component by component), with the largest t that puts
 // x onto the surface. With the least half axis c: t = (u - 1) c^2, q = a^2 / c^2, and
 //   |w(u)| = 1,   w = (q p / a) / (u + q - 1),   u > 0.
-// Newton's method for 1 / |w| = 1, which is concave, from a u that is too small never goes too far.
+// 1 / |w| is concave, so that Newton's method for 1 / |w| = 1 from a u that is too small converges
+// monotonically.
 Nearest nearest_on(const Vector3d& a, const Vector3d& p) {
   int least = 0;
   const double c = a.minCoeff(&least);
@@ -42,9 +43,9 @@ Nearest nearest_on(const Vector3d& a, const Vector3d& p) {
     return w;
   };
   double u = std::max(0.0, (z - more).maxCoeff());
-  Vector3d x = place(u);  // in parts of the half axes
+  Vector3d x = place(u);  // relative to the half axes
   if (u == 0 && x.squaredNorm() < 1) {
-    // On the disc inside from which both sides across the least axis are as near.
+    // p lies on the disc in the middle plane whose points are equally near to both sides.
     x[least] = std::sqrt(1 - x.squaredNorm());
   } else {
     for (int k = 0; k < 100; ++k) {
