@@ -5,7 +5,7 @@
 
 namespace tether::ida_projection {
 
-// Is the metric free, and can the response of F be had?
+// Whether the metric may be changed and the response of F is available.
 bool Projection::Impl::may_change_metric() const {
   return in_use(Mechanism::other_metric) && movers_.used->rows().traits.many &&
          movers_.used->rows().may_use_levels() && wanted_metric_ == Metric::automatic &&
@@ -20,11 +20,13 @@ void Projection::Impl::choose_metric(const Candidate& candidate, Move& move) {
   MoveAndResponse at{move.length, polish_.response_length(candidate)};
   if (at.response < 0.0) return;
   if (metric_choice_.doubts(at)) at = try_other_metric(candidate, at, move);
-  // Multipliers of index 2 answer to any move, by more than its length over h.
+  // Multipliers of index 2 respond to any move, by more than its length divided by h. Their
+  // response says nothing of stiffness.
   if (metric_choice_.stiff(at) && variables_.high_index()) metric_choice_.pause();
 }
 
-// The move from where the corrector was, one scale for each level, or each its own, from now on.
+// Repeats the move from the corrector's point in the other metric, which then stays: one scale for
+// each level of unknowns, or a scale for each unknown.
 Move Projection::Impl::move_by_levels(const Candidate& candidate, bool by_levels) {
   movers_.used->rows().use_levels(by_levels);
   polish_.restore(candidate);

@@ -21,7 +21,7 @@ double largest_difference(const double* a, const double* b, int n, int* where) {
 
 constexpr const char* kResidualEnded = "F, the residual function, returned a negative flag";
 
-// Largest |F_i|; -1 where it is not known. `flag`: F's.
+// Largest |F_i|; -1 if F cannot be evaluated. `flag` is what F returned.
 double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp,
                         int* flag) {
   if (residual == nullptr) return -1.0;
@@ -32,7 +32,7 @@ double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y
 
 }  // namespace
 
-// A start whose rows hang on algebraic variables that F determines.
+// A start at which rows contain algebraic variables that F determines.
 struct Projection::Impl::JointStart {
   double t = 0.0;
   N_Vector y = nullptr;  // moved on success
@@ -40,7 +40,7 @@ struct Projection::Impl::JointStart {
   ConsistencyReport report;
 };
 
-// Such rows are solved together with the equations of F, while IDA's residual callback is at hand.
+// Solves such rows together with the equations of F, while IDA's residual callback is available.
 void Projection::Impl::project_jointly(const Candidate& candidate) {
   if (inquiry_.joint_start == nullptr) return;
   movers_.joined.join(candidate, ida_.step().cj);
@@ -52,8 +52,8 @@ void Projection::Impl::project_jointly(const Candidate& candidate) {
   movers_.joined.forget();
 }
 
-// One step of IDA that goes nowhere: the decorated solver answers "no correction" and, on the way,
-// notes the error weights and which variables are algebraic. IDA must be reinitialised afterwards.
+// Lets IDA attempt a step in which the decorated solver returns no correction. It records the error
+// weights and the algebraic variables meanwhile. IDA must be reinitialised afterwards.
 bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
   OwnedVector y(yy), ydot(yp);
   N_VScale(1.0, yy, y);
@@ -67,7 +67,7 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
     answered = std::exchange(inquiry_.probe, Probe::none) == Probe::answered;
     return answered || flag != IDA_ILL_INPUT;
   };
-  // A stop time may lie on the other side, or here: IDA keeps one that it has reached.
+  // IDA refuses a step beyond a stop time, which may lie on one side of t0 or at t0.
   if (!answers(t0 + tiny) && !answers(t0 - tiny)) {
     IDASetStopTime(ida_.mem(), t0 + 2.0 * tiny);
     answers(t0 + tiny);
@@ -77,7 +77,8 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
   return answered;
 }
 
-// y' and the algebraic variables consistent with F; the reason of a failure, or nothing.
+// Makes y' and the algebraic variables consistent with F. Returns the reason of a failure, else an
+// empty text.
 std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector ydot,
                                               const Consistency& how, Status* failure) {
   using Derivative = Consistency::Derivative;
@@ -108,8 +109,8 @@ std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector yd
          "or keep y' with Consistency::Derivative::keep";
 }
 
-// y onto the constraints, algebraic variables only where rows fix them, or F does. False: IDA could
-// not be started there.
+// Moves y onto the constraints; algebraic variables only if rows or F determine them. Returns false
+// if IDA cannot start at this point.
 bool Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                                      ConsistencyReport* report, bool* jointly) {
   JointStart joint{t0, y, how.hold, {}};
@@ -125,8 +126,8 @@ bool Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot, const
   return true;
 }
 
-// Rows that contain algebraic variables move with these, and F with the rows: until neither moves
-// the other. The report has the first projection and the last drift.
+// Alternates between rows that contain algebraic variables and the equations of F, until neither
+// moves the point. The report has the length of the first projection and the last drift.
 bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                                     ConsistencyReport* report) {
   constexpr int kRounds = 8;
@@ -142,8 +143,8 @@ bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const 
     ConsistencyReport again;
     bool jointly = false;
     bool begun = project_start(t0, y, ydot, how, &again, round == 0 ? &jointly : nullptr);
-    // Far from what F asks of algebraic variables, rows that repeat F are conditions of their own:
-    // these variables move first where that moves the others less.
+    // Far from consistent algebraic variables, rows that repeat equations of F act as conditions on
+    // the other variables. Algebraic variables therefore move first if that moves the others less.
     const N_Vector id = variables_.id();
     if (begun && jointly && id != nullptr && how.hold.empty() && options_.hold.empty()) {
       const auto moved = [&](N_Vector from, N_Vector to) {
@@ -277,7 +278,7 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
   return report;
 }
 
-// IDA's present error weights once it has some; before that, weights of relative size.
+// IDA's present error weights; before its first step, weights of relative size.
 void Projection::Impl::current_weights(N_Vector y) {
   if (run_.initialized && IDAGetErrWeights(ida_.mem(), unknowns_.weights) == 0) {
     N_VScale(1.0 / control_.weights_factor(), unknowns_.weights, unknowns_.weights);
@@ -301,7 +302,7 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
   if (flag < 0 || !movers_.used) return flag;
   check_for_bypass();
   if (watch_.bypass.steps() > 0) return flag;
-  // A step that IDA returns as it is has been projected; what it interpolates has not.
+  // A point at the end of a step is projected already, an interpolated one is not.
   const Status of_step = report_.status;
   const std::string text = report_.message;
   const InUse here(in_use_);

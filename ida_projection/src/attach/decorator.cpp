@@ -1,9 +1,9 @@
 // Tether: the decorator of IDA's nonlinear solver. SPDX-License-Identifier: BSD-3-Clause
 //
-// IDA asks its nonlinear solver for the correction ycor with y = ypred + ycor, then rebuilds y and
-// y' = yppred + cj ycor, and bases its error test, order choice and history on that ycor. Moving
-// ycor here, after the decorated solver has converged, therefore is the method of Hanson and
-// Krogh: the accepted y lies on the constraints, and so do the points that predict the next step.
+// IDA's nonlinear solver returns the correction ycor. IDA then forms y = ypred + ycor and
+// y' = yppred + cj ycor, and bases its error test, order and history on ycor. Moving ycor here,
+// after the decorated solver has converged, is the method of Hanson and Krogh (method, section 2):
+// the accepted y lies on the constraints, and so do the points that predict the next step.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -18,18 +18,18 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr long kSampleEvery = 16;
-constexpr double kSudden = 10.0;     // times the last accepted move: that of a row is steadier
+constexpr double kSudden = 10.0;     // times the last accepted move: longer ones follow a jump of F
 constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
-constexpr double kShortMove = 1.0;   // tolerances: after a longer one the move comes first
+constexpr double kShortMove = 1.0;   // tolerances: after a longer move the polish comes second
 
 }  // namespace
 
-// Called by IDA once tolerances, linear solver and sensitivities are known.
+// IDA calls this once tolerances, linear solver and sensitivities are known.
 int Projection::Impl::initialize() {
   run_.initialized = run_.broken = false;
-  // IDASetMaxNonlinIters reaches the state's solver unless IDAS solves states and sensitivities
-  // together; there is no getter for that. Ask, and see whether the question arrives here.
-  // Without constraints nothing would be lost.
+  // If IDAS solves states and sensitivities together it bypasses this solver, and no getter tells
+  // so. IDASetMaxNonlinIters is called to see whether it arrives here. Without constraints
+  // nothing would be lost.
   if (movers_.used != nullptr && !corrector_.is_reached_by(ida_)) {
     finish(Status::simultaneous_sensitivities,
            "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would "
@@ -58,9 +58,8 @@ int Projection::Impl::initialize() {
   return corrector_.initialize();
 }
 
-// Times the first projection and every 16th: reading the clock costs as much as a small one, and
-// more than an evaluation of g where none is needed. The residual that is left is measured on the
-// same ones.
+// Times the first projection and every 16th one, since reading the clock costs as much as a small
+// projection. The residual after the projection is measured in the same ones.
 class Projection::Impl::Stopwatch {
  public:
   explicit Stopwatch(Impl& owner) : owner_(owner) {
@@ -102,7 +101,7 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
         "the Projection was made after IDACalcIC or the first IDASolve, so IDA never handed its "
         "linear solver over; make it between IDAInit and these, or call IDAReInit");
 
-  if (run_.broken) return kFatal;  // status and message are those of the exception
+  if (run_.broken) return kFatal;  // status and message keep the exception that broke the run
 
   Candidate candidate{0.0, y_predicted, ycor, weights};
   if (unknowns_.contiguous) candidate.with_entries();
@@ -113,14 +112,14 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   const bool asked = inquiry_.probe != Probe::none;
   int flag = asked ? probe_candidate(candidate) : step(candidate, tolerance, call_setup);
   if (flag == 0 && !asked) choose_step(candidate);
-  // Evaluations that only look around may fail, but what asks for the end of the run ends it.
+  // A failed evaluation of the plugin's own does no harm, but a fatal flag ends the run.
   const bool ended =
       corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().fatal());
   if (flag >= 0 && ended) flag = finish(Status::callback_fatal, movers_.used->message());
   return corrector_.stopped() ? corrector_.stop_flag() : flag;
 }
 
-// For make_consistent, which wants no step.
+// Records the candidate for make_consistent and returns no correction.
 int Projection::Impl::probe_candidate(Candidate& candidate) {
   N_VScale(1.0, candidate.weights, unknowns_.weights);
   if (!variables_.known()) derive_id(candidate);
@@ -135,8 +134,8 @@ void Projection::Impl::choose_step(const Candidate& candidate) {
   const bool suppressed = run_.suppressed;
   if (in_use(Mechanism::widened_tolerance) && suppressed)
     control_.widen_test(candidate, polish_, attempts_.moved, steps);
-  // Rows that nearly depend on each other ask for long moves of their own, and a row that F does
-  // not keep for such a one in every step.
+  // Nearly dependent rows cause long moves, and a row that F does not keep causes one in every
+  // step. Neither is a jump of F.
   const bool long_move = in_use(Mechanism::tested_long_moves) && attempts_.pending &&
                          attempts_.moved > options_.advanced.largest_move &&
                          attempts_.moved > kSudden * attempts_.accepted_move &&
@@ -163,7 +162,8 @@ int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool
       may_leave_out && in_use(Mechanism::free_multipliers) ? variables_.undetermined() : none);
 }
 
-// One attempt at a step: the corrector, the move of its candidate onto the constraints, the polish.
+// One attempt at a step: correct, move the candidate onto the constraints, polish (method, section
+// 2).
 int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_setup) {
   if (const std::optional<int> failed = engage_in_trouble(candidate)) return *failed;
   int flag = correct(candidate, tolerance, call_setup);
@@ -179,11 +179,11 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
     const Status engaged = engage(candidate);
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
-  bool fresh = call_setup || !corrector_.has_setup();  // of IDA's factors there are no better ones
+  bool fresh = call_setup || !corrector_.has_setup();  // IDA's factors cannot be renewed
   Moved move = move_and_polish(candidate, step.cj, tolerance, fresh);
   while (move.status == Status::success && !move.corrector_was_right && !fresh &&
          in_use(Mechanism::repeated_correction)) {
-    // A stale Jacobian fooled IDA's convergence test: correct again, with fresh ones.
+    // A stale Jacobian has fooled IDA's convergence test: correct again with a fresh one.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, candidate.correction);
     flag = correct(candidate, tolerance, true);
@@ -203,7 +203,7 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
-// The corrector has found the candidate.
+// Prepares the move of a candidate that the corrector has found.
 void Projection::Impl::begin_move(Candidate& candidate, const StepData& step) {
   if (!run_.linear_solver.known()) find_linear_solver_kind();
   account_for_previous_attempt(step);
@@ -215,7 +215,7 @@ void Projection::Impl::begin_move(Candidate& candidate, const StepData& step) {
   candidate.predicted_rate = N_VGetArrayPointer(step.yp_predicted);
 }
 
-// `fresh`: of IDA's factors there are no better ones.
+// `fresh`: IDA's factors cannot be renewed, so that no correction is repeated.
 Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candidate, double cj,
                                                           double tolerance, bool fresh) {
   Moved moved;
@@ -237,8 +237,8 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   const bool polishes = before.made
                             ? moved.length > polish_.longest_without_response(control_.smoothing())
                             : wants_polish(moved.length);
-  // A refinement: where F or the linear solver fails here, the move itself stands, unless the
-  // failure is to end the run; then the corrector has kept it.
+  // The polish is a refinement: if F or the linear solver fails in it, the move stands. A fatal
+  // flag is kept by the corrector and ends the run.
   const Fix after = polishes ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
   moved.corrector_was_right = after.corrector_was_right;
   moved.status = after.made ? movers_.used->settle(candidate, polish_.delta())
@@ -247,8 +247,8 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
 }
 
 // Polishing before the move saves one linear solve: the move removes what the polish violates. The
-// response of F to the move is then left out, so this is no choice where IDA's error test of
-// algebraic variables needs it.
+// response of F to the move is then left out, so that this order is not taken where IDA's error
+// test of algebraic variables needs the response.
 bool Projection::Impl::polishes_first() {
   if (!movers_.used->rows().traits.many) return false;
   const double longest =
@@ -260,8 +260,8 @@ bool Projection::Impl::polishes_first() {
   return silent && wants_polish(0.0);
 }
 
-// A cap is meant for a start off the constraints, which is approached step by step. A step that
-// ends farther away than the last one, by more than the error test allows, has failed.
+// Capped moves approach the constraints step by step from a start off them. A step that ends
+// farther away than the last one, by more than the error test allows, has failed.
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, attempts_.left_before)) return;
   move.status = Status::move_too_long;
@@ -270,7 +270,7 @@ void Projection::Impl::judge_capped(Move& move) {
                              ", which the error test does not allow; use a larger largest_move";
 }
 
-// IDA does not tell whether it accepted an attempt; the count of steps does, at the next one.
+// Whether IDA accepted an attempt shows in its count of steps at the next one.
 void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   const long steps = ida_.steps(), setups = ida_.setups();
   if (setups != attempts_.setups) polish_.note_setup(step.cj);

@@ -11,12 +11,13 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kNameAfter = 3;      // failed correctors in a row
-constexpr int kRefusedStarts = 5;  // of the ten error tests that IDA tries
+constexpr int kNameAfter = 3;      // failed correctors in a row before multipliers are named
+constexpr int kRefusedStarts = 5;  // failed error tests of the first step; IDA gives up after ten
 
 }  // namespace
 
-// Moves that do not converge: a wrong C as a rule. Looked into once a step, where it is to be said.
+// Adds the likely cause to the text about moves that do not converge, as a rule a wrong C. It is
+// diagnosed at most once a step.
 std::string Projection::Impl::with_suspicion(std::string text, const Candidate& candidate) {
   if (!report_.says_failures(attempts_.steps)) return text;
   if (attempts_.suspected != attempts_.steps) {
@@ -26,8 +27,9 @@ std::string Projection::Impl::with_suspicion(std::string text, const Candidate& 
   return std::move(text) + attempts_.suspicion;
 }
 
-// From a start off the constraints moves do not shrink with the step. Above Options::largest_move
-// they are refused by name, below IDA's error test refuses them, with words of its own.
+// From a start off the constraints, moves do not shrink with the step. Moves above
+// Options::largest_move are reported by name. Shorter ones fail IDA's error test, whose message
+// does not name the cause, so that it is named here.
 void Projection::Impl::check_start(const Move& move) {
   if (attempts_.steps != 0) return;
   const double before = std::exchange(attempts_.first_move, move.length);
@@ -52,7 +54,7 @@ void Projection::Impl::check_for_doubts(const Candidate& candidate, const StepDa
   if (report_.advice.empty()) report_.advice = watch_.first_steps.idle_row();
 }
 
-// y before this step; of a later one, up to its curvature.
+// Extrapolates y back over this step: exact for the first step, up to the curvature for later ones.
 void Projection::Impl::keep_point_before(const Candidate& candidate, OwnedVector& y) {
   if (!y) y = OwnedVector(candidate.base);
   N_VLinearSum(1.0, candidate.base, -ida_.step_size(), ida_.step().yp_predicted, y);
@@ -62,7 +64,8 @@ std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vect
   return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
 }
 
-// Empty: it is not. Close to a singular position the multipliers are what is to be named.
+// Names multipliers of too high an index, else returns an empty text. Close to a singular position
+// the multipliers are the cause that a user can find.
 std::string Projection::Impl::too_high_index() const {
   if (variables_.index() <= 2 || !run_.undetermined.empty()) return {};
   return "F is of index " + std::to_string(variables_.index()) +
@@ -77,7 +80,7 @@ std::string Projection::Impl::rounding_of_multipliers() const {
              : "";
 }
 
-// Ends a run that goes nowhere; the code that IDA wants then.
+// Ends a run in which IDA rejects most steps. Returns the code for IDA then.
 std::optional<int> Projection::Impl::watch_rejections(const Candidate& candidate,
                                                       const StepData& step) {
   if (watch_.rejections.stands()) {

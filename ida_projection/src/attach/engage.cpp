@@ -13,15 +13,16 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Multipliers of index 2: see method, section 7.
+// Setpoint for multipliers of index 2 (method, section 7), see care_of_high_index().
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
                  kManyFree = 0.4;
-constexpr int kFew = 16;               // times as many unknowns as rows: rows_of_field()
-constexpr double kNeedsNoMove = 1e-8;  // tolerances; a shorter move is not worth making
+constexpr int kFew = 16;               // unknowns per row from which on rows are few
+constexpr double kNeedsNoMove = 1e-8;  // tolerances: a shorter first move does not begin the policy
 
 }  // namespace
 
-// A few invariants of many unknowns, as on grids; rows of mechanisms are many and local.
+// Whether the rows are a few invariants of many unknowns, as of a field on a grid. Rows of
+// mechanisms are many and local.
 bool Projection::Impl::rows_of_field() const {
   if (std::holds_alternative<DistributedRows>(constraints_.jacobian)) return false;
   const bool gradients = std::holds_alternative<Gradients>(constraints_.jacobian);
@@ -37,7 +38,7 @@ void Projection::Impl::find_linear_solver_kind() {
   polish_.note_linear_solver(iterative);
 }
 
-// Readable through message() as long as nothing else is wrong.
+// Derives the id vector from F. What is wrong with it is readable through message().
 void Projection::Impl::derive_id(const Candidate& candidate) {
   const std::string unknown = variables_.derive(candidate, corrector_, ida_.step().cj);
   if (!unknown.empty())
@@ -56,8 +57,8 @@ void Projection::Impl::leave_out_of_error_test(bool coupled) {
       std::lround(static_cast<double>(N_VGetLength(tested)) - N_VDotProd(tested, tested));
 }
 
-// As the run began. Who gives Options::id may have called IDASetSuppressAlg as well, which IDA
-// does not tell: that stays.
+// Puts algebraic variables back into IDA's error test. Where the caller gives Options::id he may
+// have called IDASetSuppressAlg as well, which no getter tells, so that nothing is changed.
 void Projection::Impl::test_all_again() {
   if (std::exchange(run_.suppressed, false) && options_.id == nullptr) {
     IDASetSuppressAlg(ida_.mem(), 0);
@@ -65,8 +66,8 @@ void Projection::Impl::test_all_again() {
   }
 }
 
-// Multipliers of index 2 fail the error test until rounding, divided by the step, makes the
-// corrector fail: too late for the policy to begin.
+// Begins the policy when steps fail. Multipliers of index 2 fail the error test at every step size.
+// Steps would shrink until rounding, divided by the step, makes the corrector fail.
 std::optional<int> Projection::Impl::engage_in_trouble(const Candidate& candidate) {
   if (movers_.used == nullptr) return {};
   if (attempts_.steps < 0) begin_run(candidate);
@@ -82,17 +83,17 @@ std::optional<int> Projection::Impl::engage_in_trouble(const Candidate& candidat
   return finish(engaged, movers_.used->message());
 }
 
-// Before its first attempt.
+// Prepares a run before its first attempt.
 void Projection::Impl::begin_run(const Candidate& candidate) {
   quicken_vectors(candidate);
   if (unknowns_.contiguous) keep_point_before(candidate, run_.start);
 }
 
-// By how much more than usual errors are kept below the tolerance. Those at the end
-// follow (tolerance / s)^(k/(k+1)), k the order; s that grows by its (-1/k)-th power, k = 5, makes
-// them follow the tolerance. Rows that leave few directions free take most of the errors with them.
-// At loose tolerances runs are short, and most of their steps of low orders: there half of it is
-// left.
+// The factor s by which errors are kept below the tolerance. End errors follow
+// (tolerance / s)^(k/(k+1)) at order k, so that s in proportion to tolerance^(-1/k), with k = 5,
+// makes them follow the tolerance. Where rows leave few directions free the projection removes most
+// of the error, and s keeps its usual value. Runs at loose tolerances are short and of low order,
+// where s is halved.
 Care Projection::Impl::care_of_high_index(const Candidate& candidate) const {
   const N_Vector id = variables_.id();
   const Care usual{kAsideFromTest, kAsideFromTest};
@@ -104,7 +105,8 @@ Care Projection::Impl::care_of_high_index(const Candidate& candidate) const {
   return {kAsideFromTest * tighter, kAtLowOrders * tighter * tighter};
 }
 
-// Those of IDA's vectors that pass through here, and the plugin's own; the caller's are left alone.
+// Gives fast kernels to IDA's vectors that pass through here and to the plugin's own. Vectors of
+// the caller stay as they are.
 void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   N_Vector newton = nullptr;
   if (options_.nonlinear_solver == nullptr)
@@ -114,13 +116,13 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   fast::quicken({step.y_predicted, step.yp_predicted, candidate.weights, newton}, true);
 }
 
-// Until a first move is needed IDA is left alone, bit for bit: then this attempt is finished, and
-// the code for IDA is known.
+// Returns the code for IDA if this attempt needs no move: until a first move is needed, the run is
+// that of IDA bit for bit.
 std::optional<int> Projection::Impl::measure_before_engaging(const Candidate& candidate) {
   const Move first = movers_.used->measure(candidate);
   if (first.status != Status::success) {
     const int code = finish(first.status, movers_.used->message());
-    // Before the first step a smaller step cannot cure rows that contradict each other.
+    // In the first step rows that contradict each other do so at every step size.
     return attempts_.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
   }
   if (first.length <= std::max(kNeedsNoMove, first.floor) && !control_.struggling()) {
@@ -133,11 +135,11 @@ std::optional<int> Projection::Impl::measure_before_engaging(const Candidate& ca
   return {};
 }
 
-// The first move that is needed switches the policy on; until then IDA runs as it would alone.
+// Switches the policy on: IDA's settings stay as they are until the first move is needed.
 Status Projection::Impl::engage(const Candidate& candidate) {
   if (!variables_.known()) derive_id(candidate);
   const double cj = ida_.step().cj;
-  // Multipliers of higher index answer to a change of h by errors proportional to the change.
+  // Multipliers of index 2 respond to a change of h by errors in proportion to that change.
   if (options_.advanced.smooth_where_needed || (options_.suppress_algebraic && variables_.any()))
     variables_.find_index(candidate, corrector_, cj, ida_.evaluations_for_jacobian());
   else
@@ -161,7 +163,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (corrector_.stopped()) return Status::callback_fatal;
   const Status structured =
       movers_.used->rows().set_algebraic(candidate, movers_.joined.moved_id());
-  run_.engaged = structured == Status::success;  // else the next attempt looks again
+  run_.engaged = structured == Status::success;  // else the next attempt tries again
   return structured;
 }
 

@@ -36,7 +36,7 @@ namespace tether::ida_projection {
 /// Rejects values that cannot work, naming the option, its value and the allowed ones.
 void validate(const Constraints& constraints, const Options& options, N_Vector like);
 
-/// State of an add-on, beside that of the run; it hears of new runs.
+/// State of an add-on, which is told when a new run begins.
 class Companion {
  public:
   virtual ~Companion() = default;
@@ -64,7 +64,7 @@ class Projection::Impl {
 
   const Constraints& constraints() const { return constraints_; }
   Status status();
-  const std::string& message();  ///< status() and statistics() leave it as it is
+  const std::string& message();  ///< unchanged by status() and statistics()
   Statistics statistics();
   void reset_statistics();
 
@@ -74,10 +74,11 @@ class Projection::Impl {
             bool call_setup, void* mem);
   Corrector& corrector() { return corrector_; }
   long iterations_after_correction() const { return polish_.iterations(); }
-  /// The code that IDA gets for an exception, which must not pass through its C functions.
+  /// Keeps an exception as status and message; returns the code for IDA. No exception may pass
+  /// through IDA's C functions.
   int caught(Status outcome, const char* text) noexcept;
 
-  /// A call by the host, unless it is one that cannot be answered.
+  /// Runs a call of the host, or refuses it with a report where it cannot be served.
   template <class Call>
   ConsistencyReport answer(const char* function, std::initializer_list<N_Vector> vectors,
                            Call call) {
@@ -125,8 +126,8 @@ class Projection::Impl {
     // attempt.
     double left_before = 0.0, left = 0.0;
     std::string capped_message;
-    long suspected = -1;      // the step whose failures were looked into
-    std::string suspicion;    // found then
+    long suspected = -1;      // the step whose failures were diagnosed last
+    std::string suspicion;    // the diagnosis
     double first_move = 0.0;  // of the last attempt at the first step, in tolerances
     int refused_starts = 0;   // attempts at it with a move that does not shrink
   };
@@ -142,7 +143,7 @@ class Projection::Impl {
   void begin_move(Candidate& candidate, const StepData& step);
   void account_for_previous_attempt(const StepData& step);
   struct Moved : Move {
-    bool corrector_was_right = true;  ///< as its convergence test predicted
+    bool corrector_was_right = true;  ///< the polish confirmed its convergence test
   };
   Moved move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
   void judge_capped(Move& move);
@@ -156,7 +157,7 @@ class Projection::Impl {
   void find_linear_solver_kind();
   bool rows_of_field() const;
   void derive_id(const Candidate& candidate);
-  void leave_out_of_error_test(bool coupled);  ///< `coupled`: those of index 1 stay
+  void leave_out_of_error_test(bool coupled);  ///< `coupled`: variables of index 1 stay in it
   void test_all_again();
   std::optional<int> engage_in_trouble(const Candidate& candidate);
   Care care_of_high_index(const Candidate& candidate) const;
@@ -194,7 +195,7 @@ class Projection::Impl {
                     ConsistencyReport* report);
   void current_weights(N_Vector y);
 
-  // Who moves the rows: the caller's alone (null: there are none), or joined with equations of F.
+  // Movers of the caller's rows alone (null: there are none), and joined with equations of F.
   struct Movers {
     JoinedRows joined;
     std::unique_ptr<Mover> own;
@@ -224,11 +225,11 @@ class Projection::Impl {
     Probe probe = Probe::none;
     JointStart* joint_start = nullptr;
   };
-  // The caller is told this of the moves.
+  // Statistics of the moves.
   struct Tally {
     double move_sum = 0.0;
     long attempts = 0;  // since moves began
-    // Every 16th attempt is timed. The first one finds out what the others keep.
+    // Every 16th attempt is timed. The first one is counted apart: it makes what the others reuse.
     double first_seconds = 0.0, seconds = 0.0;
     long timed = 0;  // after the first
   };

@@ -109,8 +109,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   attach();
 }
 
-// IDA lets go of its own solver before it finds out that another one takes no functions: that is
-// asked before.
+// IDASetNonlinearSolver frees IDA's own solver before it refuses another one. The other one is
+// therefore tested before.
 void Projection::Impl::attach() {
   const SUNNonlinSolSysFn nothing = [](N_Vector, N_Vector, void*) { return 0; };
   const SUNNonlinSolConvTestFn converged = [](SUNNonlinearSolver, N_Vector, N_Vector, sunrealtype,

@@ -46,7 +46,8 @@ int Corrector::correct(const Candidate& candidate, double tolerance, bool call_s
   return flag;
 }
 
-// All that test_convergence needs: SUNDIALS' own functions stand between it and what catches.
+// Allocates all that test_convergence() needs. It is called through C functions of SUNDIALS and
+// must not throw.
 void Corrector::expect_followers(N_Vector differential) {
   if (differential == differential_) return;
   if (differential != nullptr && !before_) before_ = OwnedVector(differential);
@@ -60,15 +61,15 @@ int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
   return install_convergence_test();
 }
 
-// IDA's own, where nothing has to be added to it.
+// Installs IDA's own test if nothing has to be added to it.
 int Corrector::install_convergence_test() {
   return differential_ != nullptr ? SUNNonlinSolSetConvTestFn(inner_, test_convergence, this)
                                   : SUNNonlinSolSetConvTestFn(inner_, test_, test_data_);
 }
 
-// IDA takes an iteration for divergent whose second change is 0.9 of the first or more. Algebraic
-// variables follow the others: where their first change happens to be small, the second one, which
-// is quadratic in that of the others, is longer, and the third one next to nothing.
+// IDA takes an iteration for divergent if a change is longer than 0.9 of the one before. The change
+// of algebraic variables is quadratic in that of the others (method, section 6). Where their first
+// change happens to be small the second one is longer, although the iteration converges.
 int Corrector::test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                                 sunrealtype tolerance, N_Vector weights, void* self) {
   Corrector& ours = *static_cast<Corrector*>(self);
@@ -78,7 +79,7 @@ int Corrector::test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vect
              : flag;
 }
 
-// Have the differential variables converged, their rate being that of the last change?
+// Whether the differential variables have converged, by the rate of their last changes.
 bool Corrector::followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights) {
   N_VLinearSum(1.0, ycor, -1.0, change, before_);
   const double last = N_VWrmsNormMask(change, weights, differential_);

@@ -13,8 +13,8 @@
 
 namespace tether::ida_projection {
 
-/// IDA's corrector: the decorated solver with the functions that IDA hands over to it, which the
-/// plugin uses as well. A negative flag of any of them is kept: it ends the run.
+/// The decorated solver with the functions that IDA gives to it (residual, linear solver), which
+/// the plugin calls as well. A negative flag of any of them is kept and ends the run.
 class Corrector {
  public:
   /// `solver`: the caller's; null: SUNDIALS' Newton iteration, made here. inner() is null where
@@ -31,19 +31,20 @@ class Corrector {
     reached_ = true;
   }
   int maximum_iterations() const { return maximum_iterations_; }
-  /// Does IDASetMaxNonlinIters arrive here?
+  /// Whether IDASetMaxNonlinIters arrives at this solver.
   bool is_reached_by(const Ida& ida);
 
   int initialize();  ///< a new run starts
   /// A new attempt; `mem`: IDA's memory in it.
   void begin(void* mem);
-  /// The correction of the candidate. Where it fails although IDA has already cut the step for
-  /// that, its convergence test from then on leaves out `rounding`: algebraic variables of index 2
-  /// or more, whose rounding, divided by the step, fails it, and nothing but they depends on them.
+  /// Computes the correction of the candidate. If it fails although IDA has already cut the step
+  /// for that, the convergence test from then on leaves out `rounding`: algebraic variables of
+  /// index 2 or more. Their rounding, divided by the step, fails the test, and no other variable
+  /// depends on them.
   int correct(const Candidate& candidate, double tolerance, bool call_setup,
               const std::vector<int>& rounding);
-  /// If the variables that are 0 here move, when these that are 1 have converged, IDA's
-  /// convergence test has to wait, not to fail. Null: there are none.
+  /// `differential`: 1 for differential variables, 0 for followers; null: there are no followers.
+  /// When the former have converged and followers still move, IDA's test waits instead of failing.
   void expect_followers(N_Vector differential);
   /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
   /// evaluated. Once it asked for the end of the run it is not called again.

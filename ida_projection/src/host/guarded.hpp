@@ -11,7 +11,7 @@ namespace tether::ida_projection {
 constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 
-/// what() may be null.
+/// Text of an exception; what() may be null.
 inline const char* text_of(const std::exception& e) noexcept {
   const char* text = e.what();
   return text != nullptr ? text : "an exception whose what() is null";

@@ -104,7 +104,7 @@ void IdaLifetime::destroy(N_Vector v) {
   entry.destroy(v);
 }
 
-// A clone copies the table, half-made ones too: meanwhile the vector has its own operations.
+// A clone copies the table of operations, so that the vector has its original ones meanwhile.
 N_Vector IdaLifetime::clone(N_Vector v) {
   const std::lock_guard<std::mutex> lock(guard());
   find(v)->restore(v);

@@ -7,9 +7,9 @@
 
 namespace tether::ida_projection {
 
-/// IDA tells nobody that it is freed, nor that another nonlinear solver took the place of ours. But
-/// IDAFree destroys the vectors that IDAInit made: the destroy operation of one of them, in its own
-/// table, is replaced and put back. Nothing is watched where vectors share a table.
+/// Notices the end of IDA, for which SUNDIALS has no callback. IDAFree destroys the vectors that
+/// IDAInit made. The destroy operation in the table of one of them is therefore replaced, and put
+/// back at the end. Where vectors share a table nothing is watched.
 class IdaLifetime {
  public:
   IdaLifetime() = default;
@@ -20,11 +20,11 @@ class IdaLifetime {
   /// `one`, `other`: vectors that IDA owns. `at_end` is called when IDAFree begins to free them,
   /// with ida_mem still readable; it must not throw.
   void watch(N_Vector one, N_Vector other, std::function<void()> at_end);
-  /// Is ida_mem certainly there?
+  /// Whether ida_mem certainly exists.
   bool alive() const { return vector_ != nullptr; }
-  /// Was IDAFree certainly called?
+  /// Whether IDAFree was certainly called.
   bool over() const { return over_; }
-  /// Frees `solver`, which IDA may still call, together with IDA; never where nothing is watched.
+  /// Frees `solver`, which IDA may still call, together with IDA; never if nothing is watched.
   void free_at_end(SUNNonlinearSolver solver) const noexcept;
 
  private:

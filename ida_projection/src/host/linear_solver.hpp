@@ -5,9 +5,8 @@
 
 namespace tether::ida_projection {
 
-/// There is no getter for the type of IDA's linear solver, but direct ones count no iterations and
-/// iterative ones, with a Jacobian of their own or without, do from the first right-hand side that
-/// is not zero.
+/// Finds out whether IDA's linear solver is iterative, for which there is no getter. Only iterative
+/// solvers count iterations, from the first nonzero right-hand side on.
 class LinearSolverKind {
  public:
   /// After a correction; `steps`: accepted before it.

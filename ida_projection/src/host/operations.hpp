@@ -14,9 +14,8 @@
 
 namespace tether::ida_projection {
 
-/// The nonlinear solver that IDA sees. Its operations call `Owner`: corrector(), initialize(),
-/// solve(), iterations_after_correction(), caught(); what the decorated solver does by itself goes
-/// there.
+/// The nonlinear solver that IDA sees. Its operations call corrector(), initialize(), solve(),
+/// iterations_after_correction() and caught() of `Owner`; all others go to the decorated solver.
 template <class Owner>
 class Operations {
  public:
@@ -40,8 +39,8 @@ class Operations {
     return solver;
   }
 
-  /// The owner ends before IDA, which keeps a pointer to the solver: any further step fails by
-  /// name.
+  /// For an owner that ends before IDA, which keeps a pointer to the solver: any further step fails
+  /// with a message.
   static void end(SUNNonlinearSolver solver, bool prints) noexcept {
     solver->content = prints ? solver : nullptr;
     *solver->ops = _generic_SUNNonlinearSolver_Ops{};  // SUNDIALS takes what is missing for done

@@ -19,7 +19,7 @@ struct FreeBy {
 template <class Pointer, auto Free>
 using Owned = std::unique_ptr<std::remove_pointer_t<Pointer>, FreeBy<Free>>;
 
-/// Is this vector contiguous and whole in this process's memory?
+/// Whether the vector is one array in the memory of this process.
 bool is_contiguous(N_Vector v);
 
 /// An N_Vector owned by the plugin; null when empty.

@@ -8,8 +8,8 @@
 
 namespace tether::ida_projection {
 
-/// The fewest digits that give the same number again, the same in every locale: std::to_string has
-/// none left of 1e-9, and a comma in some hosts.
+/// The fewest digits that give the same number again, in every locale. std::to_string would give 0
+/// for 1e-9, and a comma in some locales.
 inline std::string shortest(double value) {
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, value).ptr};

@@ -19,7 +19,7 @@ void check_running_sundials(const SundialsBuild& built) {
   char label[32] = "";
   if (SUNDIALSGetVersionNumber(&major, &minor, &patch, label, sizeof label) != 0)
     throw std::runtime_error("Projection: SUNDIALS does not say which version it is");
-  // Within a major version functions are added, and structures keep what they have.
+  // Minor versions only add functions; structures stay compatible.
   if (major == built.major && minor >= built.minor) return;
   const auto text = [](int a, int b, int c) {
     return std::to_string(a) + "." + std::to_string(b) + "." + std::to_string(c);

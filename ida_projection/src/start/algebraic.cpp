@@ -27,7 +27,7 @@ void AlgebraicVariables::set(N_Vector id) {
 
 namespace {
 
-// Does nothing answer to a change of all columns that did not?
+// Whether no row changes when all columns change at once that changed none alone.
 bool others_are_silent(const std::vector<char>& filled, const ColumnSearch::Probe& probe) {
   std::vector<int> others;
   for (std::size_t j = 0; j < filled.size(); ++j)
@@ -39,9 +39,9 @@ bool others_are_silent(const std::vector<char>& filled, const ColumnSearch::Prob
 
 }  // namespace
 
-// Component j is algebraic if F does not change at all when y'_j does. Two changes of different
-// size are made of many y' at once (ColumnSearch). One size looks for the columns, the other one
-// looks at those that did not answer, all at once.
+// Component j is algebraic if no bit of F changes with y'_j. ColumnSearch changes many y' at once
+// and finds the columns that change F. A change of another size, of all other columns at once,
+// confirms that these do not.
 std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& corrector,
                                        double cj) {
   if (candidate.base_entries == nullptr) return "vectors without contiguous memory";
@@ -51,7 +51,7 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
       large(candidate, corrector, statistics_, Near::irregular_changes(candidate, cj, -1e3, 3.3));
   bool by_small = small.known(), by_large = large.known() && !by_small;
   const auto probe = [&](const std::vector<int>& columns, std::vector<char>& changed) {
-    bool answered = false;  // F may refuse this y', or the other size decides
+    bool answered = false;  // F may fail at one size; the other one decides then
     if (by_small) answered = small.notices(columns, Near::Of::rates, changed);
     if (by_large) answered = large.notices(columns, Near::Of::rates, changed) || answered;
     return answered;
@@ -87,7 +87,7 @@ std::vector<char> AlgebraicVariables::derivative_free_equations(const Candidate&
   std::iota(all.begin(), all.end(), 0);
   std::vector<char> noticed(n, 0);
   bool known = false;
-  for (const double size : {1.0, -0.37}) {  // F may refuse one of them
+  for (const double size : {1.0, -0.37}) {  // F may fail at one of them
     NearbyResiduals near(candidate, corrector, statistics_,
                          NearbyResiduals::irregular_changes(candidate, cj, size));
     known = near.notices(all, NearbyResiduals::Of::rates, noticed) || known;

@@ -11,7 +11,7 @@
 
 namespace tether::ida_projection {
 
-/// Unknowns up to which F is asked about each of them.
+/// Up to this number of unknowns F is evaluated for each of them.
 constexpr int kLargestProbed = 2000;
 
 /// The id vector of IDA (1 differential, 0 algebraic), the caller's or derived from F, and whether
@@ -21,7 +21,8 @@ class AlgebraicVariables {
   explicit AlgebraicVariables(Statistics& statistics) : statistics_(statistics) {}
 
   void set(N_Vector id);
-  /// From F itself at the candidate, on contiguous vectors; empty, or why it cannot be had.
+  /// Derives the id vector from F at the candidate, on contiguous vectors. Returns the reason of a
+  /// failure, else an empty text.
   std::string derive(const Candidate& candidate, Corrector& corrector, double cj);
   bool known() const { return id_; }
   bool any() const { return any_; }
@@ -32,19 +33,20 @@ class AlgebraicVariables {
   /// The vector itself, also where all are differential.
   N_Vector vector() const { return id_; }
 
-  /// Finds out the index of F at the first call; it is a property of F, which later runs share.
-  /// `usual`: evaluations of F that a Jacobian takes in this run, see index.cpp.
+  /// Finds the index of F at the first call; later runs reuse it. `usual`: evaluations of F that a
+  /// Jacobian takes in this run, see index.cpp.
   void find_index(const Candidate& candidate, Corrector& corrector, double cj, long usual);
   void note_index_as_low() { index_known_ = true; }
   bool index_known() const { return index_known_; }
   /// F is not of index 1 in its own variables.
   bool high_index() const { return index_known_ && found_.high; }
-  /// The index of F where it is 2 or more and could be found out; else 0.
+  /// The index of F if it is 2 or more and could be found, else 0.
   int index() const { return index_known_ ? found_.index : 0; }
   /// Algebraic variables of index 2 or more.
   const std::vector<int>& undetermined() const { return found_.undetermined; }
-  /// Outputs, on which no differential variable depends, and, where `coupled` is true, the others
-  /// of index 1. False: none is algebraic, or F could not be asked.
+  /// Keeps in IDA's error test the outputs, on which no differential variable depends, and, if
+  /// `coupled` is true, the other variables of index 1. Returns false if none is algebraic or F
+  /// could not be evaluated.
   bool choose_tested(bool coupled);
   /// 1 for variables that IDA's error test sees: differential ones and those chosen. Null: none is
   /// algebraic.
@@ -53,12 +55,12 @@ class AlgebraicVariables {
   const std::vector<int>& coupled() const { return coupled_; }
   void begin_run() { index_known_ = false; }
 
-  /// Doubts in the caller's id vector, after find_index(): variables that it calls algebraic
-  /// although F contains their derivatives, or differential although F does not. Empty: none is
-  /// known. Four evaluations of F at the first call, more where there are some.
+  /// Names errors of the caller's id vector, after find_index(): variables that it calls algebraic
+  /// although F contains their derivatives, or differential although F does not. Empty: none was
+  /// found. Costs four evaluations of F at the first call, more if there are errors.
   const std::string& doubts(const Candidate& candidate, Corrector& corrector, double cj);
 
-  /// The equations of F that notice no change of y', bit for bit.
+  /// The equations of F that no change of y' changes, bit for bit.
   std::vector<char> derivative_free_equations(const Candidate& candidate, Corrector& corrector,
                                               double cj) const;
 

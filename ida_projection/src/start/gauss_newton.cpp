@@ -17,7 +17,7 @@ constexpr int kMaximumIterations = 60;
 constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
 constexpr double kNear = 1.0;
-constexpr double kAside = 10.0;  // what dropped rows may ask for, beside the others
+constexpr double kAside = 10.0;  // times the move of the kept rows: dropped rows may ask for more
 
 // `Rows` keeps C and its factors: DenseRows (dense) or SparseRows.
 template <class Rows>
@@ -56,9 +56,8 @@ class GaussNewtonOn final : public GaussNewton {
   std::vector<double> id_;
 };
 
-// Output points come one after the other: what can move stays, and entries that were zero so far
-// are met by evaluate(). Only rows with variables of both kinds are split by their entries at a
-// point.
+// The structure is reused for the next output point. evaluate() notices entries that were zero so
+// far. Only the split of rows with variables of both kinds depends on the entries at a point.
 template <class Rows>
 bool GaussNewtonOn<Rows>::structured_for(const std::vector<bool>& hold, const double* id) {
   const std::vector<double> mask(id, id != nullptr ? id + n_ : id);
@@ -111,7 +110,7 @@ double GaussNewtonOn<Rows>::largest(const std::vector<double>& g) const {
   return value;
 }
 
-// A move, in tolerances, that rounding of y alone explains.
+// Length of a move that rounding of y alone explains, in tolerances.
 template <class Rows>
 double GaussNewtonOn<Rows>::floor_of(const std::vector<double>& y) const {
   double size = 0.0;
@@ -119,7 +118,7 @@ double GaussNewtonOn<Rows>::floor_of(const std::vector<double>& y) const {
   return 64.0 * kEpsilon * std::sqrt(size / n_);
 }
 
-// Does the rounding of its own terms explain every g_i at y, where C was evaluated?
+// Whether the rounding of its own terms explains every g_i at y, where C was evaluated.
 template <class Rows>
 bool GaussNewtonOn<Rows>::rounding_only(const std::vector<double>& y) const {
   for (std::size_t i = 0; i < g_.size(); ++i)

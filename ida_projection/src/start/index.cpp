@@ -12,16 +12,16 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Unknowns. Beyond the first size the look would be felt, except where each Jacobian of IDA takes
-// as many evaluations as there are unknowns, and dense factors: it costs two of these.
+// Largest numbers of unknowns. The search for the index costs two dense Jacobians by differences.
+// Beyond kLargestSize it is made only if IDA's own Jacobian is of that kind, too.
 constexpr int kLargestSize = 200, kLargestDense = kLargestProbed;
 constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
 }  // namespace
 
-// The matrix of exceeds_one() is singular where it has rows of zeros: equations of F that contain
-// neither y' nor y_a, as those of positions and velocities. Where there are as many of them as
-// algebraic variables, it leaves all of these free. Eight evaluations of F, of any size.
+// The matrix of exceeds_one() is singular if it has rows of zeros: equations of F that contain
+// neither y' nor y_a, as constraints of positions and velocities do. If there are as many of them
+// as algebraic variables, it determines none of these. Costs eight evaluations of F at any size.
 bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector& corrector,
                                            double cj) {
   if (!any_ || all_) return false;
@@ -31,7 +31,7 @@ bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector
     if (mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
   std::vector<char> noticed(free.size(), 0);
   bool answered = false;
-  for (const double size : {1.0, -1e3}) {  // F may refuse one of them
+  for (const double size : {1.0, -1e3}) {  // F may fail at one of them
     NearbyResiduals near(candidate, corrector, statistics_,
                          NearbyResiduals::irregular_changes(candidate, cj, size));
     answered = near.notices(algebraic, NearbyResiduals::Of::values, noticed) || answered;
@@ -124,7 +124,7 @@ bool AlgebraicVariables::exceeds_one(const Candidate& candidate, Corrector& corr
     if (known && differential(j) && slopes.col(j).isZero(0.0))
       found_.without_derivative.push_back(j);
   }
-  found_.known = known;  // else the next run asks again
+  found_.known = known;  // else the next run tries again
   if (known && id != nullptr) find_outputs(slopes);
   const std::vector<char> left = known ? undetermined_columns(slopes, true) : std::vector<char>();
   if (!left.empty() && id != nullptr && size <= kLargestSize)

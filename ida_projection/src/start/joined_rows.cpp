@@ -33,7 +33,7 @@ void JoinedRows::forget() {
 }
 
 void JoinedRows::join(const Candidate& candidate, double cj) {
-  forget();  // of an attempt that failed
+  forget();  // what a failed attempt has left
   if (candidate.base_entries == nullptr || !variables_.any() || !has_values(constraints_)) return;
   const auto size = static_cast<int>(N_VGetLength(candidate.base));
   if (size > kLargestProbed) return;

@@ -10,8 +10,8 @@
 
 namespace tether::ida_projection {
 
-/// Rows that hang on algebraic variables which equations of F determine are moved together with
-/// these equations.
+/// Moves rows that contain algebraic variables of index 1 together with the equations of F that
+/// determine these variables (method, section 6).
 class JoinedRows {
  public:
   JoinedRows(const Constraints& constraints, const Options& options, Statistics& statistics,
@@ -27,7 +27,8 @@ class JoinedRows {
   /// Looks for such equations at the candidate.
   void join(const Candidate& candidate, double cj);
   void forget();
-  /// IDA's y and y' as the present attempt has left them: rows at hand evaluate F elsewhere.
+  /// Evaluates F at the present candidate, so that IDA's y and y' are those of the attempt again:
+  /// the joined equations evaluate F elsewhere.
   void restore_ida() { (void)corrector_.residual(present_.correction, f_); }
   /// Moves the rows and the equations; null: the caller's rows move alone.
   Mover* mover() const { return mover_.get(); }

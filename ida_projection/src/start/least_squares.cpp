@@ -62,7 +62,7 @@ Status consistent_derivative(IDAResFn residual, void* user_data, double t, N_Vec
     const double change = dz.lpNorm<Eigen::Infinity>();
     const bool small = change <= 1e-12 || (change <= 1e-7 && change >= 0.3 * previous);
     if (small) {
-      if (!(left <= 1e-6)) return failure;  // stalled off F = 0: no solution near
+      if (!(left <= 1e-6)) return failure;  // F = 0 has no solution near
       N_VScale(1.0, y_new, y);
       N_VScale(1.0, yp_new, yp);
       return Status::success;

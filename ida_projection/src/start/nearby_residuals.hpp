@@ -62,8 +62,8 @@ class NearbyResiduals {
     return true;
   }
 
-  /// Changes of `size` tolerances, as far as y' must feel them, that vary irregularly with j: those
-  /// of one equation do not cancel.
+  /// Changes of about `size` tolerances, large enough for y' to change in the last bit. They vary
+  /// irregularly with j, so that those of one equation do not cancel.
   static std::vector<double> irregular_changes(const Candidate& candidate, double cj, double size,
                                                double turn = 2.3);
 

@@ -21,8 +21,8 @@ class PointProjection {
   /// that stay, beside those of the options. y changes only on success.
   void project(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id, N_Vector weights,
                ConsistencyReport& report);
-  /// The part of yp along the constraints at y; `report` changes where a callback ends the run.
-  /// False: not found, or not looked for.
+  /// Replaces yp by its part along the constraints at y. Returns false if it was not found;
+  /// `report` tells if a callback ended the run.
   bool tangent(double t, N_Vector y, N_Vector yp, ConsistencyReport& report);
 
  private:

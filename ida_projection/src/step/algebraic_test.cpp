@@ -1,16 +1,17 @@
 // Tether: IDA's error test of algebraic variables. SPDX-License-Identifier: BSD-3-Clause
 //
-// The test protects a run where F has several roots: no other variable sees that y_a jumps from
-// one to the other. But y_a = y_a(t, y_d) answers to a move by dy with S dy, S = dy_a/dy_d. The
-// polish leaves a part of that answer, which differs from step to step, and where S is large it
-// exceeds the tolerance at every step size. ycor is a difference of order k + 1 of the history: of
-// independent errors of size r it contains r sqrt(C(2k+2, k+1)), and the test multiplies it by
-// about 1/(k+1). The tolerance grows by a multiple of that. Where y_a does not answer to the move
-// it stays as it is, however far the step leads.
+// The test protects runs in which F has several roots y_a: no other variable notices a jump from
+// one root to another. But y_a = y_a(t, y_d) responds to a move dy by S dy, S = dy_a/dy_d. The
+// polish leaves a part of that response, which differs from step to step. Where S is large this
+// part exceeds the tolerance at every step size.
 //
-// A jump of F in time, as under a force that is switched, makes y_a jump, too. Steps that reach
-// beyond it fail the test however short they are, and those before it are accepted without end. The
-// test is left out then until ten steps in a row were accepted.
+// ycor is a difference of order k + 1 of the history. Independent errors of size r contribute
+// r sqrt(C(2k+2, k+1)) to it, and the test multiplies it by about 1/(k+1). The tolerance grows by a
+// multiple of that contribution, and stays as it is where y_a does not respond.
+//
+// A jump of F in time, as of a switched force, makes y_a jump, too. Steps beyond it fail the test
+// however short they are, and steps that end before it are accepted without end. The test is then
+// left out until ten steps in a row are accepted.
 #include "step/algebraic_test.hpp"
 
 #include <algorithm>
@@ -21,17 +22,18 @@ namespace tether::ida_projection {
 
 namespace {
 
-// A multiple of the contribution of independent errors. Three times less or more keeps the steps of
-// forms of index 1 and the roots of titrations; from ten thousand on some of these end at another
-// root.
+// Multiple of the contribution of independent errors. A value three times smaller or larger changes
+// neither the steps of forms of index 1 nor the roots of titrations; from 1e4 on some titrations
+// end at another root.
 constexpr double kOfNoise = 1e3;
 constexpr double kRounding = 1e3 * std::numeric_limits<double>::epsilon();  // of y_a, by F and J
 constexpr double kMemory = 0.9;  // per step: S changes slowly
-constexpr double kStays = 0.5;   // of the error; a shorter step lowers it as h, to 1/16 at least
-// So much shorter a step that y_a did not follow: fronts of titrations are 1e4 times wider.
+constexpr double kStays = 0.5;   // of the first error; an error that h determines falls below 1/16
+// Steps shorter by this factor, in which y_a still jumps, meet a jump of F. The fronts of
+// titrations are far wider.
 constexpr double kAtOnce = 1e-6;
-// Accepted steps in a row. Before a jump there are at most five, as IDA cuts a refused step to a
-// quarter; those of the history that reach back before it are six.
+// Accepted steps in a row after which the jump is passed. Before a jump at most five are accepted
+// in a row, as IDA cuts a rejected step to a quarter. The history reaches back by six.
 constexpr int kBeyond = 10;
 
 double noise_in_test(int order) {
@@ -51,7 +53,7 @@ void AlgebraicTest::begin(const std::vector<int>& variables) {
   jump_ = false;
 }
 
-// An attempt at the same step: the last one was refused.
+// Called for another attempt at a step whose last attempt was rejected.
 void AlgebraicTest::look_for_jump(double h, long steps) {
   accepted_ = steps != steps_ ? accepted_ + 1 : 0;
   if (accepted_ > kBeyond) {
@@ -101,7 +103,7 @@ void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
   double* weights = N_VGetArrayPointer(candidate.weights);
   for (Variable& v : variables_) {
     const double y = candidate.base_entries[v.index];
-    // Divided by a move that is next to nothing, rounding would be taken for S.
+    // A response within rounding says nothing of S.
     if (response != nullptr && std::abs(response[v.index]) > kRounding * std::abs(y))
       v.response = std::max(v.response, std::abs(response[v.index]) / move_);
     v.weight = weights[v.index];

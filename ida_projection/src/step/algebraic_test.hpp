@@ -17,11 +17,11 @@ class AlgebraicTest {
   /// A new attempt, `steps` accepted before it: its order and step size, and the length of its
   /// move.
   void begin_attempt(const Candidate& candidate, double move, int order, double h, long steps);
-  /// Do these variables keep IDA from a step of twice the size?
+  /// Whether these variables keep IDA from doubling its step.
   bool limit_step() const;
-  /// In the first step: has their error stayed where it was, though IDA has shortened the step?
+  /// In the first step: whether their error has stayed although IDA has shortened the step.
   bool stay() const;
-  /// Lowers the weights. `response`: change of y by which F answers to the move (null: not asked).
+  /// Lowers the weights. `response`: change of y by which F responds to the move; null: not known.
   void widen(const Candidate& candidate, const double* response);
   /// The weights before widen(): IDA computes them anew for a new step only.
   void restore(N_Vector weights, long steps) const;

@@ -1,10 +1,9 @@
 // Tether: the iteration after the move, foretold. SPDX-License-Identifier: BSD-3-Clause
 //
-// IDA multiplies its linear solutions by 2 / (1 + r), r = cj / (cj of its factors), which leaves
-// the part -kappa, kappa = (r - 1) / (r + 1), of a correction where F is not stiff. While the
-// factors are the same, delta is next to a multiple of the correction then, and what it is beyond
-// that changes slowly. Where it is next to -kappa ycor, kappa tells the multiple for another cj,
-// too.
+// IDA multiplies its linear solutions by 2 / (1 + r), r = cj / (cj of its factors). Where F is not
+// stiff this leaves the part -kappa, kappa = (r - 1) / (r + 1), of a correction (method, eq. 11).
+// With unchanged factors delta = share ycor + rest, and the rest changes slowly. If share is near
+// -kappa, it is known for other values of cj as well.
 #include "step/foretold.hpp"
 
 #include <cmath>
@@ -13,11 +12,11 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kUnseen = 0.003;   // tolerances: so much may delta miss
-constexpr double kNotStiff = 0.03;  // the same of what is beyond -kappa ycor
+constexpr double kUnseen = 0.003;   // tolerances: allowed error of a forecast delta
+constexpr double kNotStiff = 0.03;  // tolerances: |delta + kappa ycor| up to which F is not stiff
 constexpr int kWait = 30;
 
-// Length of factor ycor + delta.
+// Length of factor ycor + delta, in tolerances.
 double length(const double* w, double factor, const double* ycor, const double* delta, int n) {
   double sum = 0.0;
   for (int i = 0; i < n; ++i) {

@@ -5,29 +5,29 @@
 
 namespace tether::ida_projection {
 
-/// Foretells what one more Newton iteration adds to a correction, from what earlier ones have
-/// added; in forms without algebraic variables. See foretold.cpp.
+/// Forecasts the polish delta of a correction from earlier ones, in forms without algebraic
+/// variables; see foretold.cpp.
 class PolishForecast {
  public:
-  /// Before the others; once.
+  /// Called once, before all others.
   void allocate(N_Vector like) {
     beyond_ = OwnedVector(like);
     N_VConst(0.0, beyond_);
     work_ = OwnedVector(like);
   }
   void forget() { cj_ = 0.0; }
-  /// New factors, made for this cj.
+  /// IDA has new factors, made for this cj.
   void renewed(double cj) {
     cj_at_setup_ = cj;
     forget();
   }
-  /// A corrector failed: what follows may be as difficult.
+  /// A corrector failed: the next polishes are computed.
   void doubt();
-  /// An iteration added delta to ycor.
+  /// Learns from a computed delta.
   void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj);
   /// The same of n entries.
   void learn(const double* weights, const double* ycor, const double* delta, int n, double cj);
-  /// May it be foretold for a correction with this cj?
+  /// Whether delta can be forecast for a correction with this cj.
   bool tells(double cj) const { return used_in_row_ < patience_ && wait_ == 0 && known(cj); }
   void tell(double cj, N_Vector ycor, N_Vector delta) const {
     N_VLinearSum(share_at(cj), ycor, 1.0, beyond_, delta);

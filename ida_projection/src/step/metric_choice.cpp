@@ -7,11 +7,11 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kFirstMeasurements = 16;  // in a row: a start excites what is stiff
+constexpr int kFirstMeasurements = 16;  // in a row, as a start excites stiff components
 constexpr int kPause = 8, kLongestWait = 64;
-constexpr double kPart = 0.1;    // of a move: so much is answered by what is not stiff
-constexpr double kHarm = 1e-4;   // tolerances: a shorter answer does none
-constexpr double kBetter = 0.5;  // of the length
+constexpr double kPart = 0.1;    // of a move: a smaller response needs no stiff components
+constexpr double kHarm = 1e-4;   // tolerances: a shorter response does no harm
+constexpr double kBetter = 0.5;  // of move and response: the other metric is taken below it
 
 }  // namespace
 

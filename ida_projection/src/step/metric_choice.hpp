@@ -12,30 +12,30 @@ struct MoveAndResponse {
 class MetricChoice {
  public:
   void reset() { *this = MetricChoice(); }
-  /// Is it time to look at the present move?
+  /// Whether the response to the present move is to be measured.
   bool due();
-  /// Is no look due for the next move, since the last one found nothing?
+  /// Whether the next move needs no measurement, since the last one found nothing.
   bool calm() const { return calm_ && pause_ > 1; }
-  /// Do stiff components answer to it so much that it harms?
+  /// Whether stiff components respond so much that it harms.
   bool stiff(const MoveAndResponse& at) const;
-  /// After a measurement: do they, and is it time to try the other metric?
+  /// After a measurement: whether they do and the other metric is to be tried.
   bool doubts(const MoveAndResponse& at);
-  /// After that trial: is the other one taken from now on?
+  /// After that trial: whether the other metric is used from now on.
   bool prefers(const MoveAndResponse& other, const MoveAndResponse& present);
-  /// Is it time to try the other metric?
+  /// Whether the other metric may be tried again.
   bool may_try() { return wait_ == 0 || --wait_ == 0; }
-  /// Nothing will be done about the answers: look again later.
+  /// Nothing can be done about the response: measure again later.
   void pause();
-  /// There is no other one, or its move failed.
+  /// There is no other metric, or its move failed.
   void found_none();
-  bool by_levels() const { return by_levels_; }  ///< the present one
+  bool by_levels() const { return by_levels_; }  ///< the present metric
 
  private:
   static constexpr int kFirstWait = 2;
   bool by_levels_ = false, calm_ = false;
   int measurements_ = 0;        // that found nothing
-  int pause_ = 0;               // moves until the next look
-  int wait_ = 0;                // stiff answers until the next trial
+  int pause_ = 0;               // moves until the next measurement
+  int wait_ = 0;                // stiff responses until the next trial
   int next_wait_ = kFirstWait;  // after one that changed nothing
 };
 

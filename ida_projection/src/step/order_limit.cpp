@@ -16,12 +16,12 @@ constexpr double kLogLargeIfStiff = -0.6;              // 0.55
 constexpr int kSamples = 6, kSamplesAgain = 3;         // in the mean
 constexpr long kEarly = 10, kTrial = 40;          // steps with the limit; it is judged after them
 constexpr double kStopBelow = 0.5, kWorth = 0.9;  // of the step before it
-constexpr double kPatience = 0.5;                 // of these where vibrations are likely
-constexpr long kFirstSteps = 60;                  // steps: what is stiff is excited by a start
+constexpr double kPatience = 0.5;                 // factor of these where vibrations are likely
+constexpr long kFirstSteps = 60;                  // steps in which a start excites stiff components
 constexpr long kFirstWait = 100;                  // steps, after a limit that did not pay
 constexpr int kTries = 8;
-constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
-constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
+constexpr double kPassed = 0.8;        // |ycor| / (k + 1) below which the error test is passed
+constexpr double kUnderflow = 1e-200;  // weights so small that squares of errors underflow to 0
 
 }  // namespace
 
@@ -56,7 +56,7 @@ void OrderLimit::note_differences(long steps, double ycor, double curvature) {
   pending_steps_ = steps;
 }
 
-// The mean of the latest log r: each new one replaces a mean one.
+// Updates the mean of the latest log r; each sample replaces a mean one.
 void OrderLimit::take_sample(long steps, int most) {
   if (pending_steps_ < 0 || steps <= pending_steps_) return;
   pending_steps_ = -1;
@@ -82,7 +82,8 @@ double OrderLimit::control(long steps, double t, double norm) {
   return 1.0;
 }
 
-// A start excites what is stiff; orders 3 and 4, which IDA has after a few steps, keep that up.
+// A start excites stiff components, which orders 3 and 4, that IDA reaches after a few steps, do
+// not damp.
 bool OrderLimit::at_start(long steps) const {
   return stiff_ && steps < kFirstSteps && begun_ == (acted_early_ ? 1 : 0);
 }
@@ -107,8 +108,8 @@ void OrderLimit::watch(long steps, int order) {
   IDAGetCurrentStep(ida_mem_, &step_before_);
 }
 
-// IDA lowers its order by one where that makes the estimated error no larger: weights that
-// underflow make all estimates 0. Only where the error test would be passed: it is not made then.
+// IDA lowers its order by one if that does not increase the estimated error. Weights that underflow
+// make all estimates 0, and the error test void. They are used only where the test would be passed.
 double OrderLimit::lower(int order, long steps, double t, double norm) {
   if (order <= kLimit && early_) {
     hold_step(false);
@@ -127,7 +128,7 @@ double OrderLimit::lower(int order, long steps, double t, double norm) {
     pending_steps_ = -1;
     return 1.0;
   }
-  if (tries_ >= kTries) {  // something else, such as sensitivities, is in the error test
+  if (tries_ >= kTries) {  // IDA's estimates contain something else, such as sensitivities
     end();
     return 1.0;
   }
@@ -144,7 +145,7 @@ void OrderLimit::judge(long steps, double t) {
   const bool early = taken == kEarly && trials_ == 0;
   if (taken != kTrial && !early) return;
   const double mean = std::abs(t - t_since_) / static_cast<double>(taken);
-  // A vibration that a higher order excites, however long its steps are, grows.
+  // A vibration that a higher order excites grows, so that longer steps of that order do not pay.
   const double patience = stiff_ ? kPatience : 1.0;
   if (mean < patience * (trials_ > 0 ? kWorth : kStopBelow) * std::abs(step_before_))
     return release(steps, wait_);

@@ -8,32 +8,34 @@ namespace tether::ida_projection {
 
 /// BDF of order 3 to 5 amplifies undamped oscillations of frequency w where about 0.7 < w h < 5
 /// (Hairer and Wanner II, V.1): a mode whose amplitude is far below the tolerance grows until it
-/// is what the step size has to resolve. Order 2 damps it. What is seen of it is the ratio of the
-/// backward differences that IDA's error test uses,
+/// limits the step size. Order 2 damps it. It shows in the ratio of the backward differences that
+/// IDA's error test uses,
 ///
 ///     r = (|nabla^(k+1) y| / |nabla^2 y|)^(1 / (k - 1)),   nabla^(k+1) y = ycor,
 ///     nabla^2 y = h (y'_n - y'_{n-1}),
 ///
-/// 2 sin(w h / 2) of the oscillation that dominates the error. A motion worth resolving, of an
-/// amplitude of 1000 tolerances, has r < 0.4 at order 5. Where r stays large, the order is limited
-/// to 2. The limit ends where the steps become shorter with it, and where r shows that a higher
-/// order would pay. Where stiff components answer to moves the first steps return to order 2 each
-/// time that IDA raises it, unless r is small, without a limit that outlasts them. For three steps
-/// IDA's error weights are next to nothing: all its estimates are then zero, and it lowers the
-/// order by itself; IDAGetErrWeights is of no use there.
+/// which is 2 sin(w h / 2) for the oscillation that dominates the error. A motion worth resolving,
+/// of an amplitude of 1000 tolerances, has r < 0.4 at order 5. Where r stays large, the order is
+/// limited to 2. The limit ends if steps become shorter with it, or if r shows that a higher order
+/// would pay. Where stiff components respond to moves, the first steps return to order 2 each time
+/// that IDA raises it, unless r is small.
+///
+/// To lower the order IDA's error weights are made nearly zero for three steps. All its estimates
+/// are then zero, and it lowers the order by itself; IDAGetErrWeights is meaningless in these
+/// steps.
 class OrderLimit {
  public:
   OrderLimit(void* ida_mem, const Options& options)
       : ida_mem_(ida_mem), wanted_(options.advanced.limit_order) {}
 
-  /// Stiff components have answered to moves: oscillations are likely, and looked for at smaller r.
+  /// Stiff components have responded to moves: oscillations are likely, and expected at smaller r.
   void expect_oscillations() { stiff_ = true; }
   /// Before the first step.
   void reset();
   /// No limit for the rest of the run.
   void end();
-  /// Does this attempt look at y'? As the first or the second of two steps in a row; `steps`
-  /// accepted before it.
+  /// Whether y' of this attempt is kept, as that of the first of two steps in a row, or compared,
+  /// as that of the second. `steps`: accepted before it.
   bool keeps_slope(long steps) const { return on_ && steps % kEvery == 0; }
   bool compares_slopes(long steps) const { return on_ && steps % kEvery == 1; }
   /// For such a second attempt: |ycor| and |h (y'_n - y'_{n-1})| in the norm of IDA's error test.

@@ -1,19 +1,19 @@
 // Tether: one Newton iteration after the move, for noise and for algebraic variables.
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// With y_N, y'_N from the corrector and y_N - dy on the constraints, F is linearised at
-// (y_N - dy, y'_N) and solved once with the factors that IDA has:
+// The corrector gives y_N, y'_N, and y_N - dy lies on the constraints. F is linearised at
+// (y_N - dy, y'_N) and solved once with IDA's current factors (method, eq. 13):
 //
 //     J delta = -F(t, y_N - dy, y'_N) = -F(t, y_N, y'_N) + F_y dy.
 //
-// The first term is the iteration that IDA's convergence test left out; it removes the noise that
-// the history would magnify (method, eq. 12). The second one is the answer of the algebraic
+// The first term is the iteration that IDA's convergence test omitted; it removes the noise that
+// the history would magnify (method, eq. 12). The second term is the response of the algebraic
 // variables to the move, -F_a^-1 F_d dy, the step of IDACalcIC's IDA_YA_YDP_INIT. As y' stays where
-// the corrector put it, the iteration does not pull the differential variables back. What of delta
-// leaves the constraints is then taken back with the projection's own factors.
+// the corrector put it, the iteration does not pull the differential variables back. The part of
+// delta that leaves the constraints is removed with the factors of the projection.
 //
-// Krylov methods solve to a tolerance that suits IDA's own test: delta would be noise as long as
-// what it is to remove.
+// Krylov methods solve to the tolerance of IDA's own test: delta would be as inexact as the noise
+// that it should remove.
 #include "step/polish.hpp"
 #include "host/mechanisms.hpp"
 
@@ -27,8 +27,8 @@ namespace {
 
 // IDA's own test promises that one more iteration changes y by at most its tolerance.
 constexpr double kMisledFactor = 2.0;
-constexpr double kNeedsResponse = 0.1;  // tolerances: a shorter move needs no answer of y_a
-constexpr double kNeedsResponseOfMultipliers = 0.01;  // the same where they are of index 2
+constexpr double kNeedsResponse = 0.1;  // tolerances: a shorter move needs no response of y_a
+constexpr double kNeedsResponseOfMultipliers = 0.01;  // the same for multipliers of index 2
 
 }  // namespace
 
@@ -49,10 +49,10 @@ void Polish::allocate(N_Vector like, bool contiguous) {
 bool Polish::wanted(double length, bool smoothing) const {
   if (!corrector_.solves() || iterative_) return false;
   if (options_.advanced.polish == Polished::none) return false;
-  // After two iterations of its own the corrector leaves nothing worth another one, unless the move
-  // asks for an answer of the algebraic variables. Whether it made them varies from run to run,
-  // which smooth step sizes are not meant to, unless they are there for multipliers of index 2:
-  // those need two iterations in nearly every step, and answer to shorter moves.
+  // After two iterations the corrector needs no third one, unless the algebraic variables must
+  // respond to the move. With smoothed step sizes the polish is always made, because the number of
+  // iterations scatters from step to step. Multipliers of index 2 are an exception: they need two
+  // iterations in nearly every step, and respond to shorter moves.
   const bool high_index = variables_.any() && variables_.high_index();
   if (smoothing && !high_index) return true;
   return corrector_.iterations() <= 1 || length > longest_without_response(smoothing);
@@ -117,7 +117,8 @@ double Polish::response_length(const Candidate& candidate) {
   return std::isfinite(length) ? length : -1.0;
 }
 
-// Differences for sensitivities begin at the residual that IDA keeps.
+// IDAS takes differences for sensitivities from the residual that IDA keeps, so that it is
+// restored.
 const double* Polish::response(const StepData& step) {
   N_VScale(1.0, step.residual, residual_);
   const bool known = know_noise();
@@ -140,7 +141,7 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
   ++iterations_;
 
   const double algebraic = algebraic_factor(cj);
-  // A longer change than IDA's stopping test allows is no refinement: the factors were too old.
+  // A change longer than IDA's stopping test allows is no refinement: the Jacobian is stale.
   const double length = differential_length(candidate, delta_);
   if (!asked) learn_pattern(candidate, cj);
   const bool differential = length <= 10.0 * tolerance;
@@ -159,7 +160,7 @@ void Polish::learn_pattern(const Candidate& candidate, double cj) {
     forecast_.learn(candidate.weights, corrected_, delta_, cj);
 }
 
-// ycor <- ycor + delta, if earlier steps tell delta.
+// ycor <- ycor + delta, if delta can be forecast.
 bool Polish::forecast_polish(const Candidate& candidate, double cj, double tolerance) {
   if (step_known_ || corrector_.iterations() != 1 || !forecast_.tells(cj)) return false;
   forecast_.tell(cj, corrected_, delta_);

@@ -11,15 +11,15 @@
 
 namespace tether::ida_projection {
 
-/// The answer to one iteration after the corrector's.
+/// Outcome of a polish.
 struct Fix {
-  bool made = false;  ///< false: F or the linear solver fails, or none is to be had
-  /// Was the correction as small as IDA's convergence test predicted?
+  bool made = false;  ///< false: F or the linear solver fails, or there is none
+  /// Whether delta was as short as IDA's convergence test promised.
   bool corrector_was_right = true;
 };
 
-/// Removes the noise that IDA's convergence test leaves and lets the algebraic variables answer to
-/// the move; see polish.cpp.
+/// Removes the noise that IDA's convergence test leaves, and lets the algebraic variables respond
+/// to the move; see polish.cpp.
 class Polish {
  public:
   Polish(const Options& options, Statistics& statistics, Corrector& corrector,
@@ -27,33 +27,34 @@ class Polish {
       : options_(options), statistics_(statistics), corrector_(corrector), variables_(variables) {}
 
   void allocate(N_Vector like, bool contiguous);
-  /// A new solve().
+  /// A new attempt begins.
   void begin() { iterations_ = 0; }
   void note_setup(double cj) {
     cj_at_setup_ = cj;
     forecast_.renewed(cj);
   }
   void corrector_failed() { forecast_.doubt(); }
-  /// Corrections are those of one vector, each of them polished.
+  /// Allows forecasts: every correction of the one vector is polished.
   void allow_forecasts() {
     may_forecast_ = true;
     forecast_.allocate(delta_);
   }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
-  /// For the iteration of sensitivities, which has the same linear solver.
+  /// Shares the factors of another polish: sensitivities have the same linear solver.
   void follow(const Polish& other) {
     cj_at_setup_ = other.cj_at_setup_;
     iterative_ = other.iterative_;
   }
 
-  /// Is an iteration worth its price after a move of this length? `smoothing`: steps are smoothed.
+  /// Whether a polish is worth its price after a move of this length. `smoothing`: step sizes are
+  /// smoothed.
   bool wanted(double length, bool smoothing) const;
-  /// Longer moves want an answer of the algebraic variables; infinity where there are none.
+  /// Longer moves need a response of the algebraic variables; infinity if there are none.
   double longest_without_response(bool smoothing) const;
-  /// Can answer() be had?
+  /// Whether response() can be computed.
   bool is_response_available() const { return contiguous_ && corrector_.solves() && !iterative_; }
-  /// After a move: the length of F's answer to it, -J^-1 F_y dy, over the differential variables
-  /// in tolerances; -1: F or the linear solver fails.
+  /// After a move: length of the response -J^-1 F_y dy over the differential variables, in
+  /// tolerances; -1: F or the linear solver fails.
   double response_length(const Candidate& candidate);
   /// IDA multiplies linear solutions by 2 / (1 + cj / cj_at_setup), which suits variables whose
   /// equations contain y'; algebraic ones take the plain solution.
@@ -63,16 +64,16 @@ class Polish {
   }
   /// Before the move: keeps the corrector's ycor.
   void keep(const Candidate& candidate);
-  /// After it: ycor <- ycor + delta, as far as delta is to be trusted.
+  /// After the move: ycor <- ycor + delta, as far as delta can be trusted.
   Fix add_newton_step(const Candidate& candidate, double cj, double tolerance);
-  /// The corrector's ycor again.
+  /// Restores the corrector's ycor.
   void restore(const Candidate& candidate) {
     step_known_ = false;  // that move is not the next one
     N_VScale(1.0, corrected_, candidate.correction);
   }
 
-  /// After add_newton_step(): the part of delta() in algebraic variables by which F answers to the
-  /// move (N entries); null: F or the linear solver fails. One evaluation of F.
+  /// After add_newton_step(): the part of delta() that is the response of algebraic variables to
+  /// the move, N entries. Null: F or the linear solver fails. Costs one evaluation of F.
   const double* response(const StepData& step);
   N_Vector delta() const { return delta_; }          ///< of add_newton_step()
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor

@@ -13,7 +13,7 @@ constexpr int kTrapped = 10;      // steps in a row with failed error tests
 constexpr int kRefused = 3;       // failed error tests in one step
 constexpr int kOftenRefused = 4;  // steps for each failed error test, of the run so far
 
-// In the norm of IDA's error test, where `mask` has the variables that it sees.
+// Norm of IDA's error test; `mask` is 1 for the variables that it sees.
 double error_norm(N_Vector v, N_Vector weights, N_Vector mask) {
   return mask != nullptr ? N_VWrmsNormMask(v, weights, mask) : N_VWrmsNorm(v, weights);
 }
@@ -30,7 +30,7 @@ void StepControl::reset() {
   corrector_has_failed_ = false;
 }
 
-// IDA computes its weights anew for a new step, but not for another attempt at the same one.
+// IDA computes its weights for a new step only, so that another attempt would find changed ones.
 void StepControl::restore_weights(N_Vector weights, long last_steps) {
   const long steps = ida_.steps();
   if (weights_factor_ != 1.0 && steps == last_steps)
@@ -46,7 +46,7 @@ void StepControl::widen_test(const Candidate& candidate, Polish& polish, double 
   algebraic_test_.widen(candidate, asks ? polish.response(ida_.step()) : nullptr);
 }
 
-// |ycor| decides the next step size, and what it is beside the second difference the order.
+// |ycor| decides the next step size, its ratio to the second difference the order.
 void StepControl::control(const Candidate& candidate, long steps, bool engaged, N_Vector tested,
                           N_Vector differential, N_Vector unmoved) {
   if (!engaged && !smoother_.on()) return;
@@ -60,8 +60,8 @@ void StepControl::control(const Candidate& candidate, long steps, bool engaged, 
         order_limit_.control(steps, candidate.t, order_limit_.lowering() ? norm() : 0.0);
     statistics_.order_limited = order_limit_.begun();
   }
-  // Scales made of the correction let a long move take back what a jump of F has changed: the test
-  // sees the correction as it was as well.
+  // In the local metric a long move may undo what a jump of F has changed. The error test therefore
+  // sees the longer one of the corrections before and after the move.
   if (unmoved != nullptr) {
     const double before = error_norm(unmoved, candidate.weights, tested), after = norm();
     const bool hides = before > ida_.order() + 1 && after > 0.0 && before > after;
@@ -76,7 +76,7 @@ void StepControl::corrector_failed(bool engaged) {
   smoother_.refuse(std::abs(ida_.step_size()));
 }
 
-// y' of two steps in a row, now and then, for the order.
+// Compares y' of two successive steps, now and then, for the order limit.
 void StepControl::compare_slopes(const Candidate& candidate, long steps, N_Vector differential) {
   const bool keeps = order_limit_.keeps_slope(steps);
   if (!keeps && !(kept_slope_ && order_limit_.compares_slopes(steps))) return;
@@ -94,8 +94,8 @@ void StepControl::compare_slopes(const Candidate& candidate, long steps, N_Vecto
       ida_.step_size() * error_norm(slope, candidate.weights, differential));
 }
 
-// IDA may double its step right after a doubling was refused, and raises the order only after k + 2
-// steps of one size: one failed error test a step at order 1 can go on for ever.
+// IDA may double its step right after a doubling was rejected, and raises the order only after k +
+// 2 steps of one size. At order 1 a failed error test in each step can therefore go on for ever.
 void StepControl::count_refusals(bool engaged) {
   if (smoother_.on()) return;
   const long failures = ida_.error_test_failures();

@@ -12,7 +12,7 @@ namespace tether::ida_projection {
 
 class Polish;
 
-/// Smooth step sizes, the limit of the order, and the rejections by which IDA asks for them.
+/// Smooth step sizes and the order limit, and the rejected steps that decide whether they begin.
 class StepControl {
  public:
   StepControl(const Ida& ida, const Options& options, Statistics& statistics)
@@ -37,14 +37,14 @@ class StepControl {
   bool tests_algebraic() const { return algebraic_test_.acts(); }
   /// Before control(); see AlgebraicTest. The last polish followed the move.
   void widen_test(const Candidate& candidate, Polish& polish, double move, long steps);
-  /// In the first step: do they fail the test at every step size?
+  /// In the first step: whether algebraic variables fail the test at every step size.
   bool starts_off_equations(long steps) const;
   double weights_factor() const { return weights_factor_; }
   /// The corrector failed in a way that a smaller step may cure.
   void corrector_failed(bool engaged);
 
   bool smoothing() const { return smoother_.on(); }
-  /// Errors are steered to a part of what smoothing asks for.
+  /// Begins smoothing with a stricter setpoint.
   void begin_smoothing(const Care& care);
   /// For each new step.
   void count_refusals(bool engaged);

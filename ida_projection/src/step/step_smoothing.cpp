@@ -21,7 +21,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kFilter = 4.0;     // b
-constexpr double kSetpoint = 4.0;   // errors are steered to its inverse of what is allowed
+constexpr double kSetpoint = 4.0;   // sigma: errors are steered to 1 / sigma of what IDA allows
 constexpr double kFar = 0.5;        // of the setpoint
 constexpr double kOfOrder = 1.348;  // setpoints of neighbouring orders: 6^(1/6)
 
@@ -87,8 +87,8 @@ void StepSmoother::attempt_was_accepted() {
   }
 }
 
-// s makes steps s^(1/(k+1)) times shorter: 6 at order 5 as much as 2.4 at order 2, at which short
-// runs stay.
+// A setpoint s makes steps shorter by s^(1/(k+1)). It depends on the order so that steps of all
+// orders become shorter by the same factor.
 double StepSmoother::setpoint(int order) const {
   const double graded = care_.most * std::pow(kOfOrder, order - max_order_);
   return kSetpoint * std::max(graded, std::min(care_.least, care_.most));
@@ -156,7 +156,7 @@ double StepSmoother::control(long steps, double norm) {
   return 1.0;
 }
 
-// Would the error of twice the step be that little?
+// Whether the error of a doubled step would still be far below the setpoint.
 bool StepSmoother::far_below(double log_c, int order) const {
   return log_c >= (order + 1) * std::log(kLargest) - std::log(kFar);
 }
@@ -182,9 +182,9 @@ double StepSmoother::request(double ratio, double h, bool grows, double norm) {
   return 1.0;
 }
 
-// IDA reduces h by any ratio asked for where its own is below 1, which it is for an error above
-// 0.5. Weights that make it so change no decision on the order, which compares errors; the error
-// test has to be passed all the same.
+// IDA reduces h by any requested ratio if its own ratio is below 1, that is, for an error above
+// 0.5. The weights are multiplied so that the error exceeds 0.5 but passes the test. The order,
+// which compares errors, does not change.
 double StepSmoother::reduce_by_weights(double ratio, double h, double norm) {
   constexpr double kAsked = 0.55, kPassed = 0.95;
   const double factor = kAsked / (error_constant(h, order_) * norm);
@@ -196,7 +196,7 @@ double StepSmoother::reduce_by_weights(double ratio, double h, double norm) {
   return factor;
 }
 
-// IDA checks what each function is given: those whose value stays are left out.
+// Calls IDA's setters only for values that have changed.
 void StepSmoother::set(double lowest_fixed, double highest_fixed, double largest, double low,
                        double max_step) {
   const Settings now{lowest_fixed, highest_fixed, largest, low, max_step};

@@ -10,8 +10,8 @@ namespace tether::ida_projection {
 /// A bound of IDASetEtaFixedStepBounds that no ratio of steps reaches: keep h.
 constexpr double kAnyRatio = 1e30;
 
-/// Factors of the setpoint s: at the largest order, and what is left of it at least
-/// below that, see StepSmoother::setpoint().
+/// Factors of the setpoint s: at the largest order, and its least value at lower orders, see
+/// StepSmoother::setpoint().
 struct Care {
   double most = 1.0, least = 1.0;
 };
@@ -26,9 +26,9 @@ struct Care {
 /// largest order only; below it the step is held for k + 2 steps and then changed once, by the
 /// geometric mean of c over them. A rejected step or a new order starts the filter anew.
 ///
-/// If it has begun by itself h is doubled at once as long as the error of the double would be
-/// half of what is steered for or less: k + 2 steps for each doubling are many after a failure in
-/// the start. Sizes that were refused are approached by the filter.
+/// If smoothing has begun by itself, after failures, h is doubled at once as long as the error
+/// of the doubled step would be at most half the setpoint: k + 2 steps for each doubling would be
+/// many. The filter approaches sizes that were rejected.
 class StepSmoother {
  public:
   StepSmoother(void* ida_mem, const Options& options);
@@ -52,7 +52,7 @@ class StepSmoother {
 
  private:
   static constexpr int kMaximumOrder = 5;
-  static constexpr double kNearRefused = 0.9;  // of a size that was refused: as good as that
+  static constexpr double kNearRefused = 0.9;  // of a rejected size: as large as that size
 
   void attempt_was_accepted();
   double setpoint(int order) const;
