@@ -23,7 +23,7 @@ long first_not_finite(const double* a, long n) {
   return -1;
 }
 
-// Beyond that C as a whole, of which next to nothing is filled, costs more than its entries.
+// With more rows C as a dense matrix, which is almost empty, costs more than its entries.
 constexpr int kSmallCount = 128;
 constexpr double kSmallMatrix = 65536.0;
 
@@ -32,7 +32,8 @@ bool has_sparse_rows(const Constraints& set) {
          std::any_of(set.joined.begin(), set.joined.end(), has_sparse_rows);
 }
 
-// A row whose pattern is empty can never move anything, which a row of zeros may yet do.
+// A row without entries in its pattern can never move a variable; it differs from a row that is
+// zero now.
 bool has_rows_without_entries(const Constraints& set) {
   const auto* given = std::get_if<SparseJacobian>(&set.jacobian);
   return (given != nullptr &&
@@ -146,8 +147,8 @@ Status Evaluator::not_finite(double t, const double* g) {
   return Status::not_finite;
 }
 
-// `what`: the callback under way. Entries that are not finite are found by the factors, which scan
-// them anyway.
+// `what` names the callback. Entries that are not finite are found by the factorisation, which
+// reads them anyway.
 int Evaluator::rows_of(const Part& part, double t, const double* y, int n, const double* scale,
                        const std::vector<int>& columns, double* C, double* g, const char** what) {
   const int count = part.set->count;
@@ -267,8 +268,8 @@ int Evaluator::differences(const Part& part, double t, const double* y, int n, c
   int told = evaluate(y, g_base_.data());
   for (std::size_t k = 0; k < columns.size() && told == 0; ++k) {
     const auto j = static_cast<std::size_t>(columns[k]);
-    // About one tolerance, or the root of rounding of atol / rtol: less would drown in the rounding
-    // of g where y_j passes zero.
+    // About one tolerance, or sqrt(eps) atol / rtol: where y_j passes zero a smaller increment
+    // would be lost in the rounding of g.
     const double least = scale[j] * std::max(1.0, kRootEpsilon * relative);
     double increment = std::max(kRootEpsilon * std::abs(y[j]), std::min(least, 1e-4 * largest));
     if (increment == 0.0) increment = kRootEpsilon;

@@ -15,13 +15,13 @@
 
 namespace tether::ida_projection {
 
-/// Do the rows on n unknowns get sparse factors? Those of a set with a SparseJacobian in it that is
-/// large. A small one gets the factors of dense rows, however it is given: the same rows then make
-/// the same run, bit for bit, and factors with pivots find their rank.
+/// Whether the rows on n unknowns get sparse factors: if the set contains a SparseJacobian and is
+/// large. A small set gets dense factors however it is given. The same rows then give the same run
+/// bit for bit, and pivots find their rank.
 bool wants_sparse_factors(const Constraints& set, int n);
-/// Is there anything to project onto? Rows of other processes count.
+/// Whether there is anything to project onto. Rows of other processes count.
 bool has_rows(const Constraints& set);
-/// Is g given by Constraints::value on the whole y, and C by entries or differences?
+/// Whether g is given by Constraints::value on the whole y, and C by entries or differences.
 bool has_values(const Constraints& set);
 
 /// Why the set, or one joined to it, cannot be evaluated on so many unknowns; empty if it can.
@@ -29,7 +29,7 @@ std::string wrong_length(const Constraints& set, long unknowns);
 
 bool all_finite(const double* a, std::size_t n);
 
-/// Room in which a callback may write more than it should without harm, and is found out.
+/// Memory behind the results of a callback, which shows whether it writes too much.
 class GuardedRoom {
  public:
   void reserve(std::ptrdiff_t count, std::ptrdiff_t more) {
@@ -70,7 +70,7 @@ class Evaluator {
     for (Part& part : parts_) part.g_room.reserve(part.set->count, std::max(part.set->count, n));
   }
   bool uses_differences() const { return uses_differences_; }
-  /// Are there rows with a function that gives g and C together?
+  /// Whether some rows have a function that gives g and C together.
   bool gives_both() const { return gives_both_; }
 
   /// g(t, y), m entries. success, not_finite, callback_recoverable or callback_fatal.
@@ -117,8 +117,8 @@ class Evaluator {
   /// Which row the last not_finite or failing callback belongs to, or what it threw.
   const std::string& message() const { return message_; }
 
-  /// A callback returned a negative flag or threw: whoever met it as a mere failure of a trial
-  /// point must not hide that. Until forget() every evaluation then fails without another call.
+  /// Whether a callback has returned a negative flag or thrown. Until forget() every evaluation
+  /// then fails without a call, so that no failed trial point hides it.
   bool fatal() const { return fatal_; }
   void forget() { fatal_ = false; }
 
@@ -135,7 +135,7 @@ class Evaluator {
   /// writes too much, which ends the run. C, whose copy would cost, is looked at the first time.
   template <class Fill>
   int write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries, Fill&& fill);
-  // The answers of the callbacks of one set, g and C at its places.
+  // Calls the callbacks of one set; g and C are written to the places of the set.
   int value_of(const Part& part, double t, const double* y, int n, double* g);
   int rows_of(const Part& part, double t, const double* y, int n, const double* scale,
               const std::vector<int>& columns, double* C, double* g, const char** what);

@@ -10,10 +10,10 @@
 
 namespace tether::ida_projection {
 
-/// Gradients q joined to rows C. With w the part of q that is orthogonal to the rows of C in the
-/// metric, a move along w changes q alone: the shortest move for C, and after it that along the w
-/// for what is left of the q, is the shortest for all. Nothing is left of a row that depends on C;
-/// it must then hold by itself.
+/// Full rows q joined to sparse rows C. Let w be the part of q that is orthogonal to the rows of C
+/// in the metric: a move along w changes the values of q alone. The shortest move for C, followed
+/// by moves along the w for what is left of the q, is the shortest move for all. A q that depends
+/// on C has no w and must hold by itself.
 class Border {
  public:
   /// move <- the shortest one with C move = C v.

@@ -19,8 +19,8 @@ using linalg::at;
 constexpr double kRankTolerance = 1e-6;
 constexpr double kLocallySolved = 1e-12;
 constexpr double kSolved = 1e-6;  // of the move; more is left to the next one
-// Nothing must seem to be left of a full row that depends on the others, however small the
-// eigenvalues of H that take part.
+// Tight enough for a full row that depends on the others to leave nothing, however small the
+// eigenvalues of H are.
 constexpr double kSolvedForBorder = 1e-11;
 constexpr int kMostSteps = 300, kPatience = 20;
 
@@ -257,7 +257,7 @@ void DistributedStore::solve(N_Vector D, N_Vector dy) {
   if (!border_.empty()) border_.add(D, dy);
 }
 
-// The shortest dy with C dy = linear_, as far as the rows say.
+// The shortest dy with C dy = linear_ over the rows that take part.
 void DistributedStore::solve_linear(N_Vector D, N_Vector dy, double solved) {
   left_ = 0.0;
   if (!coupled_) {

@@ -47,7 +47,7 @@ class DistributedStore {
   bool contains_algebraic(N_Vector id);
   bool whole() const { return whole_; }
   bool rounding_only();
-  /// Do rows ask for more than half a tolerance beyond what dy gives them?
+  /// Whether rows ask for more than half a tolerance beyond dy.
   bool contradict(N_Vector dy);
 
  private:

@@ -9,7 +9,7 @@
 
 namespace tether::ida_projection {
 
-/// y = base + correction, and what a tolerance is.
+/// y = base + correction of a candidate, and the size WT of a tolerance.
 class LoadedCandidate {
  public:
   explicit LoadedCandidate(int size)
@@ -25,9 +25,9 @@ class LoadedCandidate {
     WT_known_ = false;
     restart();
   }
-  /// y for the correction as it is now.
+  /// Computes y anew from the present correction.
   void restart() { add(base_, ycor, static_cast<int>(y.size()), y.data()); }
-  /// 1/w. A weight of zero means that the error of this component does not count at all.
+  /// 1/w; 0 for a weight of zero, which means that the error of the component does not count.
   const std::vector<double>& WT() {
     if (!WT_known_)
       for (std::size_t i = 0; i < WT_.size(); ++i) WT_[i] = w[i] > 0.0 ? 1.0 / w[i] : 0.0;

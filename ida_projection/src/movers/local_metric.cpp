@@ -41,7 +41,7 @@ void LocalMetric::fill(LoadedCandidate& at, Block& d, Block& a) {
     block->for_columns([=](int k, int i) {
       const double s = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
       trial[i] = s;
-      // WT = 0 (unweighted): such a component moves freely by what the corrector moved it.
+      // A component without a weight (WT = 0) has the corrector's change as its scale.
       const double weighted = 1.0 / (w[i] > 0.0 ? w[i] : 1.0);
       const double weight = w[i] > 0.0 ? weighted : s;
       D[k] = local ? std::max(s, kMetricFloor * weight) : weight;
@@ -66,10 +66,10 @@ void LocalMetric::use_groups(LoadedCandidate& at, Block& d, Block& a) {
   }
 }
 
-// Errors of positions are h times those of velocities. Corrections do not show that in the short
-// steps of a start, where those of positions are the quadratic part of the motion that the next
-// order will have: then errors of velocities are repaired by sliding positions along, and where
-// these are stiff, as beside the pin of a long chain, it is felt for long.
+// Errors of positions are h times those of velocities (method, section 4). Corrections do not show
+// this in the short steps of a start, where those of positions are large for their errors. Errors
+// of velocities would then be repaired by changes of positions, which excite stiff components, as
+// beside the pin of a long chain.
 template <class Block>
 void LocalMetric::limit(const LoadedCandidate& at, Block& block) const {
   double* const D = block.D();

@@ -9,7 +9,7 @@
 
 namespace tether::ida_projection {
 
-/// s, the size of the corrector's changes, and D made of it (method, eq. 9, 10).
+/// The local metric: s, the size of the corrector's changes, and D (method, eq. 9, 10).
 class LocalMetric {
  public:
   LocalMetric(const Options& options, int size)
@@ -17,12 +17,12 @@ class LocalMetric {
         scale_(static_cast<std::size_t>(size), 0.0),
         trial_scale_(static_cast<std::size_t>(size), 0.0) {}
 
-  /// s with the present candidate, for accept(). Factors that are used again keep their D.
+  /// Updates s with the present candidate; accept() keeps it. Factors that are reused keep their D.
   void update_scale(const LoadedCandidate& at);
-  /// The same, and D of both blocks of rows: s or, where the error weights are asked for, WT.
+  /// The same, and sets D of both blocks of rows: from s or, by the option, WT.
   template <class Block>
   void fill(LoadedCandidate& at, Block& d, Block& a);
-  /// D of every component, by the candidate that look() or fill() saw last.
+  /// D of every component, at the last candidate.
   void current(const LoadedCandidate& at, double* D) const;
   /// One scale for each of these groups, in place of Options::group.
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }

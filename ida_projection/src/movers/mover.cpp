@@ -11,15 +11,15 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kNothing = 1e-8;         // tolerances: as good as no move
+constexpr double kNothing = 1e-8;         // tolerances: a shorter move counts as none
 constexpr double kLargestFloor = 0.1;     // tolerances
-constexpr double kStaleRowsSafety = 4.0;  // by so much C of an earlier step may mislead
-constexpr int kMostTests = 16;            // looks with the factors of one
-constexpr int kUnneededMoves = 8;         // moves that were none, then looks begin again
-constexpr int kUsualMoves = 3;            // moves with a whole C
+constexpr double kStaleRowsSafety = 4.0;  // factor for C of an earlier step
+constexpr int kMostTests = 16;            // candidates tested with the factors of an earlier one
+constexpr int kUnneededMoves = 8;         // moves below kNothing in a row, then tests begin again
+constexpr int kUsualMoves = 3;            // moves with a C that is renewed in each
 // This part of Options::tolerance is left where a move costs little beside the factors.
 constexpr double kCheapRest = 1e-4;
-constexpr double kLeft = 0.03;  // of a first move, where nothing is known yet
+constexpr double kLeft = 0.03;  // part of a first move that it leaves, until curvature is measured
 
 }  // namespace
 
@@ -37,7 +37,7 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
   }
 
   const double ratio = length / previous_;
-  // Only a clean second move says something about curvature: not one made of rounding.
+  // A second move within rounding says nothing about curvature.
   if (moves_ == 2) curvature_.measured(previous_, previous_, length > 10.0 * floor ? length : 0.0);
   previous_ = length;
 
@@ -46,7 +46,7 @@ Monitor::Verdict Monitor::judge(double length, bool fresh, double floor) {
     if (length * ratio <= tolerance) return Verdict::done;
     return last ? Verdict::failed : Verdict::go_on;
   }
-  // No longer halving: rounding (then nothing can be gained) or a broken iteration.
+  // Lengths no longer halve: rounding is reached, or the iteration does not converge.
   if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, tolerance)})) return Verdict::done;
   if (!fresh && !last) return Verdict::refactor;
   return Verdict::failed;
@@ -73,9 +73,8 @@ double Mover::remaining_drift(const Candidate& candidate) {
   return rows_->value(candidate.t, false) == Status::success ? rows_->drift() : -1.0;
 }
 
-// Do C and the factors of an earlier look show that there is nothing to do? A run whose constraints
-// IDA keeps by itself looks at every step and finds rounding: g alone tells, while what its factors
-// make of it is far below the length at which moves begin.
+// Whether C and the factors of an earlier candidate show that no move is needed. In a run whose
+// constraints IDA keeps by itself g is rounding in every step, and evaluating g alone suffices.
 bool Mover::clearly_needs_no_move() {
   if (!in_use(Mechanism::looks) || !rows_->may_test_with_factors() || tests_ >= kMostTests)
     return false;
@@ -111,8 +110,8 @@ Move Mover::measure(const Candidate& candidate) {
   return result;
 }
 
-// The same where moves have begun, after some that were none: rows that F contains, or that IDA
-// keeps by itself between the steps that need them.
+// The same after moves have begun, once several were not needed: for rows that F contains, or that
+// IDA keeps by itself in most steps.
 bool Mover::needs_no_move_again(const Candidate& candidate, Move& result) {
   if (!in_use(Mechanism::looks) || nothing_in_row_ < kUnneededMoves) return false;
   result.status = rows_->value(candidate.t, false);
@@ -171,8 +170,7 @@ void Mover::newton(const Candidate& candidate, Move& result) {
   result.status = Status::success;
 }
 
-// Is a first move of that length, which is no short one? False: it was refused, or made as far as
-// is allowed.
+// Whether a long first move may be made as it is. False: it was rejected, or made up to the cap.
 bool Mover::allowed(const Candidate& candidate, Move& result) {
   const double length = result.length;
   const double limit = options_.advanced.largest_move * std::max(1.0, rows_->change());
@@ -193,20 +191,21 @@ bool Mover::allowed(const Candidate& candidate, Move& result) {
   return false;
 }
 
-// After a move with factors of this step. Another status than success: it will not be done.
+// After a move: whether Newton's method has ended. A status other than success means that it
+// failed.
 bool Mover::done(const Candidate& candidate, const Solution& found, bool fresh, Move& result,
                  Monitor::Verdict& verdict) {
   const double length = found.length;
-  // A first move longer than the largest floor need not know it.
+  // A first move longer than the largest floor does not need the floor.
   const double floor = result.moves == 1 && length > kLargestFloor
                            ? 0.0
                            : std::min(kLargestFloor, 1e3 * kEpsilon * rows_->size());
   verdict = monitor_.judge(length, fresh, floor);
-  // Almost parallel rows magnify rounding: a move that it explains has converged.
+  // Nearly parallel rows magnify rounding. A move that rounding explains has converged.
   if ((verdict == Monitor::Verdict::failed || verdict == Monitor::Verdict::refactor) &&
       length <= std::min(kLargestFloor, rows_->rounding_length()))
     verdict = Monitor::Verdict::done;
-  // One that answers nothing but rounding of g leads nowhere, however long it is.
+  // If g is rounding the move is meaningless, however long it is.
   if (verdict == Monitor::Verdict::failed && rows_->rounding_only()) {
     result.status = rows_->apply(-1.0, candidate);
     return result.status == Status::success;
@@ -235,7 +234,7 @@ Status Mover::finish(const Candidate& candidate) {
   return goes_on ? remove_rest(candidate, move_length_) : Status::success;
 }
 
-// With factors that belong to a point `reach` tolerances away.
+// Removes what a polish has changed in g, with factors of a point `reach` tolerances away.
 Status Mover::remove_rest(const Candidate& candidate, double reach) {
   const bool cheap = rows_->traits.measures_rest, measure = curvature_.due(reach, ++settles_);
   const double enough = (cheap ? kCheapRest : 1.0) * options_.advanced.tolerance;
@@ -253,7 +252,7 @@ Status Mover::remove_rest(const Candidate& candidate, double reach) {
     if ((still_ && age_ > 0) || !rows_->traits.gives_g)
       break;  // by next to nothing, which says nothing about its rate
     const double length = found.length;
-    // Only what is seen on this candidate counts where moves are cheap.
+  // Cheap moves allow the rate to be measured on this candidate.
     const double expected =
         cheap ? length * (k > 0 ? length / previous : kLeft) : curvature_.left(reach, length);
     const bool enough_done = (k > 0 || cheap || !measure) && expected <= enough;

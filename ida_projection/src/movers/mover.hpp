@@ -23,13 +23,12 @@ struct Move {
   double drift_after = 0.0;   ///< the same where g was evaluated last; see remaining_drift()
   int moves = 0;              ///< Newton moves made
   double floor = 0.0;         ///< measure(): length that rounding of y alone explains
-  bool looked = false;        ///< there was nothing to move
+  bool looked = false;        ///< no move was needed, which g and earlier factors have shown
   bool capped = false;
   double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };
 
-/// Watches a sequence of Newton moves: is it done, still converging, or broken? Lengths are in
-/// tolerances.
+/// Judges a sequence of Newton moves: done, converging, or failed. Lengths are in tolerances.
 class Monitor {
  public:
   enum class Verdict { done, go_on, refactor, failed };
@@ -37,14 +36,14 @@ class Monitor {
   explicit Monitor(const Options& options) : options_(&options) {}
   void reset() { *this = Monitor(*options_); }
 
-  /// A new candidate.
+  /// Begins a new candidate.
   void start() {
     previous_ = -1.0;
     moves_ = 0;
     ++candidates_;
   }
-  /// After a first move of this length: is it plain, whatever `floor` is, that judge() will call it
-  /// done? Then judge() need not be asked.
+  /// After a first move of this length: whether judge() would return done for any `floor`, which
+  /// then need not be computed.
   bool plainly_done(double length) {
     const bool done = moves_ == 0 && leaves_little(length);
     if (done) moves_ = 1;
@@ -55,7 +54,7 @@ class Monitor {
   Verdict judge(double length, bool fresh, double floor);
 
  private:
-  // Newton's second move is about kappa d^2.
+  // Newton's second move has the length kappa d^2, about.
   bool leaves_little(double length) const {
     return !curvature_.due(length, candidates_) &&
            curvature_.left(length, length) <= options_->advanced.tolerance;
@@ -86,12 +85,12 @@ class Mover {
   Move measure(const Candidate& candidate);
   /// Moves the candidate: correction <- correction - dy.
   Move move(const Candidate& candidate);
-  /// The correction was changed by `change` after a successful move(): takes back what leaves the
-  /// constraints, with the current factors.
+  /// After a successful move() the correction was changed by `change`: removes what this changes in
+  /// g, with the current factors.
   Status settle(const Candidate& candidate, N_Vector change);
-  /// No settle() follows the last move(): completes it.
+  /// Completes the last move() if no settle() follows.
   Status finish(const Candidate& candidate);
-  /// Largest |g_i| at the candidate as it is now; -1 where g is not known or fails.
+  /// Largest |g_i| at the present candidate; -1 if g cannot be evaluated.
   double remaining_drift(const Candidate& candidate);
   /// RowsAt::tangency(), unless C is that of an earlier candidate.
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) {
@@ -115,7 +114,7 @@ class Mover {
   int age_ = 0;               // of the factors, in candidates
   int tests_ = 0;             // with the factors of an earlier candidate
   int nothing_in_row_ = 0;    // moves that were none
-  bool still_ = false;        // the last candidate was only looked at
+  bool still_ = false;        // the last candidate needed no move
   Curvature curvature_;       // for what a polish moves
   long settles_ = 0;
 };

@@ -1,4 +1,4 @@
-// Tether: the rows at a candidate, as Newton's method onto them wants them (method, section 3).
+// Tether: the interface of stored rows to Newton's method (method, section 3).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
@@ -22,8 +22,8 @@ struct Tangency {
 /// The move dy for the present g by the current factors.
 struct Solution {
   Status status = Status::success;
-  double length = 0.0;  ///< WRMS, in tolerances, of what the error test sees
-  double left = 0.0;    ///< the part of it that an iterative solution has left
+  double length = 0.0;  ///< WRMS over the variables of the error test, in tolerances
+  double left = 0.0;    ///< part of the move that an iterative solution has left
 };
 
 /// The purpose of a solution.
@@ -34,18 +34,19 @@ enum class Solve {
   test    ///< no move follows
 };
 
-/// g, C and its factors in one storage, for the candidate that was loaded last. Newton's loop asks
-/// for load, value, factor, solve, apply and the sizes that rounding explains; the rest of the
-/// functions says what the storage is good for.
+/// g, C and its factors for the candidate that was loaded last. Newton's loop calls load(),
+/// value(), factor(), solve(), apply() and the functions about rounding. The other functions tell
+/// what the storage can do.
 class RowsAt {
  public:
-  /// The same for a storage's whole life.
+  /// Properties that do not change during the life of a storage.
   struct Traits {
-    /// Is there a g? A projection of the caller's own tells none, and one solution is all of it.
+    /// Whether there is a g. A projection of the caller's own has none and consists of one
+    /// solution.
     bool gives_g = true;
-    /// Are second moves cheap beside the factors? Then what is left is seen on each candidate.
+    /// Whether second moves are cheap beside the factors. Then each candidate is checked by one.
     bool measures_rest = false;
-    /// Are there so many rows that moves in the metric may be rough, or be polished before?
+    /// Whether rows are so many that moves may be rough, or polished first.
     bool many = false;
   };
   explicit RowsAt(const Traits& these) : traits(these) {}
@@ -53,8 +54,8 @@ class RowsAt {
 
   const Traits traits;
 
-  /// y = base + correction. `refills`: factors of this candidate's metric follow; else its scale is
-  /// looked at.
+  /// Loads y = base + correction. `refills`: factor() in the metric of this candidate follows; else
+  /// only its scale is updated.
   virtual Status load(const Candidate& candidate, bool refills) = 0;
   /// g at y; `with_rows`: C will be wanted, too.
   virtual Status value(double t, bool with_rows) = 0;
@@ -70,25 +71,25 @@ class RowsAt {
   virtual bool rounding_only() { return false; }
   virtual double rounding_length() { return 0.0; }
 
-  /// y moves with a correction that was changed; the length of that over the variables that the
-  /// error test sees, in tolerances.
+  /// Moves y with a changed correction. Returns the length of `change` over the variables of the
+  /// error test, in tolerances.
   virtual double shift(N_Vector change) = 0;
-  /// y for the correction as it is.
+  /// Computes y anew from the present correction.
   virtual void restart(const Candidate& candidate) = 0;
   /// Largest |g_i| as evaluated last.
   virtual double drift() const = 0;
 
   virtual bool has_factors() const = 0;
-  /// May they tell that there is nothing to move?
+  /// Whether current factors may be used to see that no move is needed.
   virtual bool may_test_with_factors() const { return has_factors(); }
-  /// Was it found out for this candidate which rows are independent?
+  /// Whether the independent rows were determined for this candidate.
   virtual bool decided() const { return true; }
   virtual void forget_rank() {}
-  /// May the correction be polished before the move?
+  /// Whether the correction may be polished before the move.
   virtual bool may_polish_first() const { return false; }
-  /// Rows that a solution leaves out contradict the others: `message` and `contradicting` say it.
+  /// Whether dropped rows contradict the kept ones; sets `message` and `contradicting`.
   virtual bool contradicts() = 0;
-  /// Moves were broken or many: perhaps for want of entries that g could not fill before.
+  /// Moves failed or were many: perhaps entries of C are missing that g could not fill before.
   virtual void refresh_pattern_soon() {}
 
   /// Which components are algebraic (1 differential, 0 algebraic; null: none), at a candidate.
@@ -98,8 +99,8 @@ class RowsAt {
   /// The attempt that used the last candidate was accepted: its scale is kept.
   virtual void accept() {}
   virtual void reset() = 0;
-  /// One scale for all unknowns of a level (row_levels.hpp) from the next move on, or each its own
-  /// again. False: nothing changes, there are too few rows or levels.
+  /// From the next move on: one scale for all unknowns of a level (row_levels.hpp), or a scale for
+  /// each unknown. Returns false if there are too few rows or levels.
   virtual bool use_levels(bool) { return false; }
   virtual bool may_use_levels() const { return false; }
 
@@ -108,7 +109,7 @@ class RowsAt {
     return false;
   }
 
-  /// Did a callback ask for the end of the run since forget_failure(), in any evaluation?
+  /// Whether a callback has returned a fatal flag since forget_failure().
   virtual bool fatal() const = 0;
   virtual void forget_failure() = 0;
 

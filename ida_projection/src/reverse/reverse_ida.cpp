@@ -30,9 +30,9 @@ constexpr std::size_t kStack = std::size_t{1} << 20;
 void free_context(SUNContext context) { SUNContext_Free(&context); }
 void free_ida(void* mem) { IDAFree(&mem); }
 
-/// A function on a stack of its own, which can be left and entered again. `body` must not throw and
-/// has to return before the Fiber is destroyed, if it was ever entered: unwinding its stack by an
-/// exception, as Boost would, is not for frames of C.
+/// A function on a stack of its own, which can be left and entered again. `body` must not throw. If
+/// it was ever entered it has to return before the Fiber is destroyed: Boost would unwind its stack
+/// by an exception, which must not pass through frames of C.
 class Fiber {
  public:
   template <class Body>

@@ -17,7 +17,7 @@ using linalg::at;
 
 }  // namespace
 
-// Returns of the groups that wait each that shares no row with those before it in the set.
+// Moves waiting groups into set_, as long as each shares no row with those before it.
 void ColumnSearch::take_set() {
   set_.clear();
   rest_.clear();
@@ -65,7 +65,7 @@ ColumnSearch::Outcome ColumnSearch::probe_together(const std::vector<std::size_t
     known += static_cast<long>(rows.size());
   }
   if (answered && known == std::count(changed_.begin(), changed_.end(), 1)) return Outcome::found;
-  // The probe failed, or a row answered that no parent knew: one by one.
+  // The probe failed, or a row changed that no parent group had changed: groups are probed singly.
   for (const std::size_t k : members) {
     const Outcome outcome = probe_alone(groups_[k]);
     if (outcome != Outcome::found) return outcome;

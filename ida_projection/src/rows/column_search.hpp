@@ -7,27 +7,27 @@
 
 namespace tether::ida_projection {
 
-/// A function of n variables whose dependence is not known: which variables does it not notice at
-/// all? Groups of variables are changed together and halved where some row answers; groups whose
-/// rows are disjoint, as far as their parents' rows tell, share an evaluation. Variables that few
-/// rows share cost some 2 log2(n) probes altogether, n that all rows share cost 2 n.
+/// Finds the variables on which a function of n variables does not depend. Groups of variables are
+/// changed together and halved if some row changes. Groups whose parents changed disjoint rows
+/// share an evaluation. Variables that few rows share cost about 2 log2(n) probes altogether, n
+/// variables that all rows share cost 2 n.
 class ColumnSearch {
  public:
-  /// Changes these variables at once; sets changed[i] to 1 for the rows that answer (it comes
-  /// zero). False: the function cannot be evaluated there.
+  /// Changes these variables at once and sets changed[i] to 1 for each row that changes; `changed`
+  /// comes as zeros. False: the function cannot be evaluated there.
   using Probe = std::function<bool(const std::vector<int>& columns, std::vector<char>& changed)>;
   enum class Outcome { found, too_many_probes, refused };
 
   ColumnSearch(int columns, int rows, Probe probe, long most_probes)
       : n_(columns), m_(rows), probe_(std::move(probe)), left_(most_probes) {}
 
-  /// filled: n entries, 1 where some row answers.
+  /// `filled`: n entries, 1 if some row depends on the variable.
   Outcome run(std::vector<char>* filled);
 
  private:
   struct Group {
     int begin, end;
-    std::vector<int> rows;  // that can answer
+    std::vector<int> rows;  // rows that may depend on it
   };
   void take_set();
   Outcome probe_together(const std::vector<std::size_t>& members);

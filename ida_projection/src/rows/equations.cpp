@@ -46,7 +46,7 @@ bool slopes(const Residual& residual, const std::vector<int>& equations,
   return h->allFinite();
 }
 
-// Which unknowns the equations notice, by large changes near a point where nothing is zero.
+// On which unknowns the equations depend, by large changes near a point at which nothing is zero.
 std::vector<std::vector<int>> patterns(const Residual& residual, const std::vector<int>& equations,
                                        std::vector<double> point) {
   const std::size_t n = point.size();
@@ -99,7 +99,7 @@ Dense select(const Dense& from, const std::vector<int>& rows, const std::vector<
   return out;
 }
 
-// The part of a row that the orthonormal rows so far leave; twice is enough.
+// Orthonormal rows, by Gram-Schmidt applied twice.
 class Span {
  public:
   Eigen::VectorXd rest(Eigen::VectorXd row) const {
@@ -120,7 +120,8 @@ class Span {
   std::vector<Eigen::VectorXd> units_;
 };
 
-// C and h at one point, scaled, and the shares x of h that make up the algebraic part of rows of C.
+// C and h at one point, scaled, and the multiples x of h that cancel the algebraic part of rows of
+// C.
 struct Point {
   Dense C, h;
   linalg::LeastSquares factors{kPresent};  // of h_a^T
@@ -201,8 +202,8 @@ std::vector<int> rows_with_algebraic(Evaluator& rows, double t, const std::vecto
   return found;
 }
 
-// By values at points in three directions, so far away that rounding is felt in the eleventh digit
-// at most: rows that only touch an equation there differ in the fifth.
+// Compares values at points in three directions, far enough away that rounding stays below the
+// tenth digit. Rows that only touch an equation differ in the fifth.
 bool are_the_equations(Evaluator& rows, const Residual& residual, const std::vector<int>& which,
                        const std::vector<char>& derivative_free, double t,
                        const std::vector<double>& y, const std::vector<double>& WT) {
@@ -252,7 +253,7 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
   }
   if (equations.empty() || algebraic.empty()) return found;
 
-  // Looked at away from the candidate for what there is, at the candidate for what it amounts to.
+  // Away from the candidate structural entries are not zero; at the candidate they have their size.
   Point away, here;
   const bool far =
       away.evaluate(rows, residual, equations, t, further_away(y, WT), WT, free, algebraic);
@@ -275,7 +276,7 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
       plain.add(here.C.row(i).transpose(), kPresent);
   }
 
-  // Which rows say something new about y_d, and on which equations they hang.
+  // Finds the rows that constrain y_d in a new direction, and the equations that they need.
   std::vector<char> used(equations.size(), 0);
   std::vector<int> joint;
   for (int i : hanging) {
@@ -304,8 +305,7 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
       mark(away.h, static_cast<int>(e));
       mark(here.h, static_cast<int>(e));
     }
-  // Rows that contain no other algebraic variables move with them; equations that they repeat would
-  // only be dropped again.
+  // Rows without other algebraic variables move with them. Equations that they repeat are left out.
   Span together;
   const auto follows = [&](int j) { return id[j] == 0.0 && !found.moves[at(j)]; };
   for (int i = 0; i < m; ++i) {

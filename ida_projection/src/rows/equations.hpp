@@ -19,28 +19,28 @@ using Residual = std::function<bool(const double* y, double* f)>;
 ///
 ///     (C_d - C_u h_u^-1 h_d) dy_d = g,
 ///
-/// and solved for y_u alone it would undo F. Such rows are moved together with the h that they hang
-/// on, over y_d and y_u jointly.
+/// and solved for y_u alone it would violate F. Such rows are moved together with the equations h
+/// that determine their y_u, over y_d and y_u jointly (method, section 6).
 struct JoinedEquations {
   std::vector<int> equations;             ///< indices into F; empty: nothing has to be joined
   std::vector<std::vector<int>> columns;  ///< the unknowns in each, ascending
   std::vector<char> moves;                ///< N: algebraic variables that move with the rest
 };
 
-/// The rows that contain free algebraic variables, at y or away from it. Without F.
+/// The rows that contain free algebraic variables, at y or away from it. F is not evaluated.
 std::vector<int> rows_with_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
                                      const std::vector<double>& WT, const std::vector<bool>& hold,
                                      const double* id);
 
-/// Are these rows, up to factors, the equations of F without y', all of them? Where F is of index 1
-/// nothing has to be joined then, which three evaluations of F tell.
+/// Whether these rows are, up to factors, all equations of F without y'. If F is of index 1 nothing
+/// has to be joined then. Costs three evaluations of F.
 bool are_the_equations(Evaluator& rows, const Residual& residual, const std::vector<int>& which,
                        const std::vector<char>& derivative_free, double t,
                        const std::vector<double>& y, const std::vector<double>& WT);
 
-/// Finds them at the point y, of which the candidate is `derivative_free` rows of F: those without
-/// y'. id: 1 differential, 0 algebraic. WT: error weights. Nothing is joined for rows that repeat
-/// equations of F (a tension row), nor for those whose algebraic variables F does not determine in
+/// Finds the equations to join at the point y. `derivative_free`: the equations of F without y'.
+/// id: 1 differential, 0 algebraic. WT: error weights. Nothing is joined for rows that repeat
+/// equations of F (a tension row), nor for rows whose algebraic variables F does not determine in
 /// this way (multipliers of velocity rows): these are solved for their algebraic variables.
 JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
                                       const std::vector<char>& derivative_free, double t,

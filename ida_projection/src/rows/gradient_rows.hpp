@@ -22,12 +22,12 @@ class GradientRows {
 
   /// `WT`: tolerances. Returns the first row that is not finite; -1: none.
   int factor(N_Vector D, N_Vector WT);
-  /// Until the next factor() only rows that are independent by so much take part.
+  /// Until the next factor() only rows whose independent part is at least `least` take part.
   void keep_firm(double least);
-  /// dy <- the shortest D^-1 dy with C dy = g, as far as the rows that are kept say.
+  /// dy <- the shortest D^-1 dy with C dy = g over the kept rows.
   void solve(const std::vector<double>& g, N_Vector D, N_Vector dy);
-  /// After solve(): a dropped row that asks for more than half a tolerance beyond the kept ones,
-  /// and those, ascending. Empty: none.
+  /// After solve(): a dropped row that asks for more than half a tolerance beyond the kept rows,
+  /// and those rows, ascending. Empty: there is none.
   std::vector<int> contradicting() const;
 
  private:

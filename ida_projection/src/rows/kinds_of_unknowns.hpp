@@ -6,9 +6,9 @@
 
 namespace tether::ida_projection {
 
-/// Is a row one for the differential variables although it contains algebraic ones? Where their
-/// part (in tolerances, squared) is nothing beside the rest, solving for them would divide by
-/// nothing; what it leaves is then as small. `already`: it was so before.
+/// Whether a row is solved for differential variables although it contains algebraic ones. This is
+/// so if the algebraic part (in tolerances, squared) is negligible beside the rest: solving for it
+/// would divide by nearly zero. `already`: it was so before.
 inline bool loses_algebraic_part(double algebraic, double differential, bool already) {
   constexpr double kLost = 1e-3, kBack = 1e-2;
   const double share = already ? kBack : kLost;
@@ -30,8 +30,8 @@ struct KindsOfUnknowns {
   }
   bool any_algebraic() const { return !id_.empty(); }
   bool algebraic(int j) const { return !id_.empty() && id_[static_cast<std::size_t>(j)] == 0.0; }
-  /// Looks at the mixed rows with part(row, squares): the squares of their algebraic and of their
-  /// differential entries, in tolerances. Does a row belong to another block than before?
+  /// Updates `without` by part(row, squares), which gives the squares of the algebraic and of the
+  /// differential entries of a row, in tolerances. Returns whether a row changes its block.
   template <class Part>
   bool changed(Part part) {
     bool other = false;

@@ -11,10 +11,10 @@ struct RowPattern {
   int n = 0;
 };
 
-/// Level of each of n columns; -1: no row has it. A row whose columns are some of those of another
-/// one fixes these by itself: the other one is there for the rest. So position rows have positions
-/// (level 0), velocity rows positions and velocities (these are of level 1), rows of accelerations
-/// all three.
+/// Level of each of n columns; -1: no row contains it. If the columns of a row are a subset of
+/// those of another row, the other row determines the remaining columns, which are one level
+/// higher. So positions, in position rows, have level 0; velocities, which velocity rows contain
+/// besides positions, have level 1; accelerations have level 2.
 std::vector<int> levels_of_columns(const RowPattern& rows);
 
 }  // namespace tether::ida_projection

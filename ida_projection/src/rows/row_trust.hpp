@@ -7,17 +7,17 @@
 
 namespace tether::ida_projection {
 
-/// Rows that depend on each other on the set { g = 0 } do not off it: a distance d away they are
-/// independent by kappa d, kappa the rate at which the unit rows of C D turn with y. What the
-/// others leave of such a row's g is of order d^2, or round-off, and divided by kappa d it asks
-/// for a move as long as d itself, or longer, in a direction that means nothing.
+/// Rows that are dependent on the set { g = 0 } are independent at a distance d from it, by an
+/// angle kappa d; kappa is the rate at which the unit rows of C D turn with y (method, section 9).
+/// The part of g of such a row that the others do not explain is of order d^2, or rounding. Divided
+/// by kappa d it would cause a move as long as d, or longer, in a meaningless direction.
 ///
-/// So a row counts only if its independent part is larger than what its direction changes by over
-/// the move that the firm rows, those with |R_kk| >= kThin, ask for:
+/// A row therefore takes part only if its independent part exceeds the change of its direction over
+/// the move of the firm rows, those with |R_kk| >= kThin:
 ///
 ///     |R_kk| >= 2 kappa |dy| .
 ///
-/// This costs one comparison where every row is firm.
+/// If every row is firm this costs one comparison.
 class RowTrust {
  public:
   static constexpr double kThin = 1e-3;
@@ -26,18 +26,17 @@ class RowTrust {
 
   static bool has_thin_rows(const Solver& solver) { return solver.least_square() < kThin * kThin; }
   static int firm_rows(const Solver& solver) { return rows_from(solver, kThin); }
-  /// Only `trusted` of the thin rows count now: will that be so in the next steps, whatever their
-  /// moves are? Only where all thin rows are left out, and none is independent enough to count
-  /// whenever moves are short.
+  /// Whether the number of `trusted` rows will be the same in the next steps, whatever their moves.
+  /// It is if all thin rows are left out, and none is independent enough for short moves.
   static bool lasting(const Solver& solver, int firm, int trusted) {
     return trusted == firm && solver.independent_part(firm) <= kDependent;
   }
-  /// Rows to be trusted for a move of this length (tolerances) by the firm rows.
+  /// Number of rows that take part for a move of this length (tolerances) of the firm rows.
   int trusted_rows(const Solver& solver, double length) const;
 
-  /// Thin rows cannot be judged for a move of this length before C was looked at behind it.
+  /// Whether C must be evaluated after a move of this length before thin rows can be judged.
   bool must_learn(double length) const { return kappa_ < 0.0 && length > kShort; }
-  /// Is it time to look how C turns over a move of this length?
+  /// Whether the turn of C over a move of this length is to be measured.
   bool wants_to_learn(double length);
   /// From C (row-major, n columns) before and after the move; rows, columns: those in the solver.
   void learn(Solver& solver, const std::vector<int>& rows, const std::vector<int>& columns, int n,
@@ -55,7 +54,7 @@ class RowTrust {
   }
 
   double kappa_ = -1.0;    // for each tolerance of length; < 0: not known yet
-  double measured_ = 0.0;  // longest move over which it was looked for
+  double measured_ = 0.0;  // longest move over which it was measured
   long candidates_ = 0;
 };
 

@@ -100,11 +100,11 @@ void SplitRows<Solver>::split() {
     C_.visit_places(i, [&](int j, std::size_t, bool seen) {
       if (kinds_.held[at(j)] || (!seen && C_.full(i))) return;
       empty = false;
-      // An entry of a pattern that is zero wherever it was looked at makes no row algebraic.
+      // An algebraic entry of the pattern counts only if it differs from zero at one of the points.
       used[at(j)] |= seen || !kinds_.algebraic(j);
       algebraic_row[at(i)] |= seen && kinds_.algebraic(j) && !kinds_.without[at(i)];
     });
-    // A row that vanishes here may come to hang on any of them.
+    // A row that vanishes at these points may depend on any variable.
     for (int j = 0; empty && j < n_; ++j)
       used[at(j)] |= !kinds_.held[at(j)] && !kinds_.algebraic(j);
   }

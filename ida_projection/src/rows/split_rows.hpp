@@ -15,8 +15,8 @@
 
 namespace tether::ida_projection {
 
-/// When to look again which entries of C differences have to visit, that is, which ones g can fill
-/// by now: at the C evaluations number 16, 32, 64, ..., and with the next one after a failure.
+/// When to find out again which entries of C differences have to visit: at the evaluations of C
+/// number 16, 32, 64, ..., and at the next one after a failure.
 class PatternRefresh {
  public:
   bool due() {
@@ -47,10 +47,10 @@ class SplitRows {
   using Block = BlockOf<Solver>;
   static constexpr bool kDense = std::is_same_v<Solver, linalg::MinimumNorm>;
   static constexpr bool kSparse = !kDense;
-  /// Dense factors of rows that are known to be independent cost half of an orthogonal
-  /// factorisation, and a tenth where rows are many.
+  /// Dense rows that are known to be independent are factored by their Gram matrix, which costs
+  /// less than an orthogonal factorisation.
   static constexpr bool kKeepsRank = kDense;
-  /// Then what Newton's method leaves is cheap to take, too.
+  /// With many rows a second Newton step is cheap beside the factors.
   static bool many(int rows) { return kDense && rows > linalg::MinimumNorm::kSmallRows; }
   /// Dense pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = kDense;
@@ -78,7 +78,7 @@ class SplitRows {
   /// or to none? Then rearrange(), fill D and evaluate again.
   bool outgrown() const { return outgrown_; }
   void rearrange();
-  /// A move failed: perhaps for want of entries that g could not fill before.
+  /// A move failed: perhaps entries of C are missing that g could not fill before.
   void refresh_pattern_soon() { refresh_.soon(); }
   /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor();
@@ -104,17 +104,17 @@ class SplitRows {
     C_.visit(i, f);
   }
 
-  /// After solve(): what dropped rows ask for beyond the kept ones, in tolerances.
+  /// After solve(): length of the move that dropped rows ask for beyond the kept ones, in
+  /// tolerances.
   double left_of_dropped(const std::vector<double>& WT) const;
-  /// The same where that is too much: names the rows.
+  /// Whether that length is too large; names the rows then.
   bool contradict(const std::vector<double>& WT);
 
   Contradiction contradiction;
   std::string message;
 
  private:
-  /// Part of a move that a solution may leave: Newton's next one takes it. The same part of g is
-  /// as much less as the factors say that rows depend on each other.
+  /// Part of a move that an iterative solution may leave to Newton's next step.
   static constexpr double kSolved = 1e-6;
 
   Status find_seen(Evaluator& evaluator, double t, const std::vector<double>& y,

@@ -40,7 +40,7 @@ void StoredRows::notice_all() {
   for (std::size_t e = 0; e < seen_.size(); ++e) seen_[e] |= values_[e] != 0.0;
 }
 
-// Looks at all of them without a branch for each, as next to always none is.
+// Checks all entries without a branch for each, since hardly ever one has changed.
 bool StoredRows::notice(const std::vector<std::size_t>& entries) {
   std::uint64_t bits = 0;
   for (const std::size_t e : entries) {

@@ -8,8 +8,8 @@
 
 namespace tether::ida_projection {
 
-/// The m rows of C on n unknowns: rows with a sparse pattern, and full rows of n entries, of which
-/// it is noted which entries can differ from zero.
+/// The m rows of C on n unknowns: rows with a sparse pattern, and full rows of n entries. For full
+/// rows it records which entries were ever seen to differ from zero.
 class StoredRows {
  public:
   /// `sparse`: sets with a SparseJacobian keep their pattern; otherwise every row is full.
@@ -45,7 +45,8 @@ class StoredRows {
   void notice(int i, int j) { seen_[static_cast<std::size_t>(row(i).begin + j)] = 1; }
   void forget_seen() { seen_.assign(values_.size(), 0); }
   void notice_all();
-  /// Notices those of these entries that are not zero. Were there any, or some noticed otherwise?
+  /// Records which of these entries are not zero. Returns whether any is, or one that was recorded
+  /// as constant has changed.
   bool notice(const std::vector<std::size_t>& entries);
 
   /// C at y; differences visit `columns`. g: null, or receives the values, too.

@@ -16,7 +16,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kOnTangent = 1e-8;  // tolerances; a shorter move is not worth making
+constexpr double kOnTangent = 1e-8;  // tolerances: a shorter move is not made
 constexpr int kFewRows = 64;         // factors for each sensitivity
 
 [[noreturn]] void refuse(const std::string& text) {
@@ -106,7 +106,7 @@ void SensitivityCorrector::forget_run() {
   }
 }
 
-// IDA's count of steps tells at the next attempt whether this one was accepted.
+// Whether an attempt was accepted shows in IDA's count of steps at the next one.
 void SensitivityCorrector::accept() {
   const long steps = state_.ida.steps();
   if (steps == steps_ + 1)
@@ -171,7 +171,7 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   return flag;
 }
 
-// Derivatives of coupled algebraic variables, which the state's test widens.
+// Leaves out derivatives of coupled algebraic variables, for which the state has a wider tolerance.
 void SensitivityCorrector::leave_out_of_error_test(N_Vector weights) {
   saved_steps_ = state_.ida.steps();
   saved_weights_.clear();
@@ -259,8 +259,7 @@ Status SensitivityCorrector::derivative(int k, double t, N_Vector y) {
   return status;
 }
 
-// Equations of F that are moved with the rows hold, as far as they are solved, for what Newton's
-// iteration has just found: r_ = 0 there.
+// Equations of F among the rows are solved by Newton's iteration already: r_ = 0 for them.
 void SensitivityCorrector::add_terms(int k) {
   const std::vector<double>& terms = row_terms_[static_cast<std::size_t>(k)];
   const auto own = static_cast<std::size_t>(state_.constraints.total_count());

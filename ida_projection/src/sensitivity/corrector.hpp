@@ -26,11 +26,11 @@ namespace tether::ida_projection {
 
 /// After IDAS has corrected the sensitivities s_k = spred_k + e_k of a step whose state is
 /// projected already: e_k <- e_k - ds_k with C (s_k - ds_k) + dg/dp_k = 0, C at that state and in
-/// a metric D as for its move. As for the state, one Newton iteration follows, and is taken back
-/// onto the rows: it removes what IDAS' convergence test left and lets algebraic variables answer.
+/// a metric D as for its move. As for the state, a polish follows, and is moved back onto the rows:
+/// it removes the noise that IDAS' convergence test leaves and lets algebraic variables respond.
 ///
-/// Few rows have factors that cost so little that each sensitivity has a metric of its own, from
-/// the size of its own corrections: errors are 1.2 to 2.4 times smaller than in that of the state.
+/// If rows are few, factors are cheap. Each sensitivity then has a metric of its own, from the size
+/// of its corrections, which makes its errors smaller than the metric of the state does.
 class SensitivityCorrector final : public Companion {
  public:
   /// The half of the plugin that moves the state.

@@ -12,10 +12,10 @@
 
 namespace tether::ida_projection {
 
-/// C at one state, and the shortest ds with C ds = r there. The rows are linear in s: what a move
-/// leaves is rounding. Rows that depend on each other on the set only have derivatives that do so
-/// too, up to the distance from the set over their independence, which means nothing: rows that are
-/// independent by less than a thousandth take no part.
+/// C at one state, and the shortest ds with C ds = r there. The rows are linear in s, so that one
+/// move leaves rounding only. Rows that are dependent on the set have dependent derivatives there,
+/// up to an error as large as the distance from the set. Rows whose independent part is below a
+/// thousandth therefore take no part.
 class TangentRows {
  public:
   virtual ~TangentRows() = default;
@@ -43,7 +43,7 @@ std::unique_ptr<TangentRows> make_contiguous_tangent(const Constraints&, const O
                                                      Statistics&, int size);
 std::unique_ptr<TangentRows> make_gradient_tangent(const Constraints&, Statistics&, N_Vector like);
 
-/// The one of them that suits the rows.
+/// Chooses between them by the kind of the rows.
 inline std::unique_ptr<TangentRows> make_tangent_rows(const Constraints& rows,
                                                       const Options& options,
                                                       Statistics& statistics, N_Vector like) {

@@ -9,8 +9,8 @@ void BypassWatch::begin() {
   steps_at_attach_ = ida_.steps();
 }
 
-// After an attempt IDA has accepted at most one step that the plugin has not heard of: IDA's count
-// has to be the one at the last attempt, or one more, or none after IDAReInit.
+// Between two calls of the plugin IDA accepts at most one step: its count has to be that of the
+// last attempt, or one more, or 0 after IDAReInit.
 long BypassWatch::steps_without_plugin(long last_steps, bool initialized) const {
   if (!watching_ || !lifetime_.alive()) return steps_unseen_;
   long steps = 0;

@@ -82,7 +82,7 @@ std::string RejectionWatch::cause(const Candidate& candidate, const StepData& st
   return out.str();
 }
 
-// The candidate is where moves have led: y' need not fulfil F there.
+// At the candidate, which moves have changed, y' need not satisfy F.
 std::string RejectionWatch::suspicion(const Candidate& candidate, Corrector& corrector) const {
   if (candidate.base_entries == nullptr) return {};
   std::string found = wrong_entry(candidate);
@@ -92,7 +92,7 @@ std::string RejectionWatch::suspicion(const Candidate& candidate, Corrector& cor
   return found.empty() ? found : "; " + found;
 }
 
-// A row with a double root: Newton's move for it alone leaves a fourth of g.
+// Finds a row that is a square: Newton's move for it alone leaves a fourth of g.
 std::string RejectionWatch::squared_row(const Candidate& candidate, Corrector& corrector) const {
   const auto size = static_cast<int>(N_VGetLength(candidate.base));
   if (!has_values(constraints_) || size > kLargestSearch) return {};
@@ -128,7 +128,7 @@ std::string RejectionWatch::squared_row(const Candidate& candidate, Corrector& c
   return found;
 }
 
-// By differences of g.
+// Finds a wrong entry of C by differences of g.
 std::string RejectionWatch::wrong_entry(const Candidate& candidate) const {
   const auto length = static_cast<int>(N_VGetLength(candidate.base));
   if (!has_values(constraints_) || length > kLargestSearch) return {};
@@ -139,7 +139,7 @@ std::string RejectionWatch::wrong_entry(const Candidate& candidate) const {
   return found.empty() ? found : "check_jacobian finds there: " + found;
 }
 
-// A row that F does not keep: C y' + g_t, term by term from differences of g.
+// Finds a row that F does not keep, by C y' + g_t from differences of g.
 std::string RejectionWatch::suspected_row(const Candidate& candidate, const StepData& step) const {
   const auto length = static_cast<int>(N_VGetLength(candidate.base));
   if (!has_values(constraints_) || length > kLargestSearch) return {};

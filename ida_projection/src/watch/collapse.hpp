@@ -10,24 +10,26 @@
 
 namespace tether::ida_projection {
 
-/// Counts the attempts that IDA repeats; where they are most of a stretch, looks for the cause.
+/// Counts the attempts that IDA rejects. If they are the majority in a window of steps, it finds
+/// the cause.
 class RejectionWatch {
  public:
   explicit RejectionWatch(const Constraints& constraints) : constraints_(constraints) {}
 
   void reset();  ///< a new run starts
-  /// At each new attempt: was the last one rejected, and was its move long enough to fail the error
-  /// test? Does t change with this one? `steps`: accepted before it.
+  /// Called at each new attempt. `repeated`: the last one was rejected; `moved`: its move was long
+  /// enough to fail the error test; `advances`: t changes with this one; `steps`: accepted before
+  /// it.
   void count(bool moved, bool repeated, bool advances, long steps);
-  /// Have many accepted steps been shorter than the rounding of t?
+  /// Whether many accepted steps were shorter than the rounding of t.
   bool stands() const { return standing_ >= kMostStanding; }
-  /// Were there rejections in most steps of a stretch, or such moves in every step of a longer one,
-  /// by rows of which one is known to be false?
+  /// Whether most steps of a window were rejected, or long moves were made in every step of a
+  /// longer window and a row is known to be false.
   bool collapsed(bool false_row) const {
     return collapsed_ || (false_row && moved_in_row_ >= kMostMoved);
   }
-  /// The fault found at the corrector's point, where y' = yppred + cj ycor fulfils F.
-  /// `doubt`: one that was found before.
+  /// The cause, found at the corrector's point, where y' = yppred + cj ycor satisfies F. `doubt`: a
+  /// cause that was found before.
   std::string cause(const Candidate& candidate, const StepData& step,
                     const AlgebraicVariables& variables, Corrector& corrector,
                     const std::string& doubt) const;

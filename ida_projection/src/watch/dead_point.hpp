@@ -9,10 +9,10 @@
 
 namespace tether::ida_projection {
 
-/// Do the derivatives of F by algebraic variables depend on each other at y, contiguous? Then F
-/// does not determine these in any form of it, and Newton's matrix is singular: at singular
-/// positions, where joints depend on each other, and where some are there twice. Names them and the
-/// rows of which that is true; empty: none, or not known.
+/// Names algebraic variables that F does not determine at y (contiguous), because its derivatives
+/// by them are dependent. Newton's matrix is then singular in every form of F: at singular
+/// positions, and where joints are given twice. Names the rows of which the same is true, too.
+/// Empty: there are none, or it is not known.
 std::string undetermined_multipliers(const Candidate& candidate, N_Vector y,
                                      const AlgebraicVariables& variables, Corrector& corrector,
                                      const Constraints& constraints, Statistics& statistics);

@@ -13,7 +13,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kOffItsSet = 2.0;  // tolerances that F has taken a row off its set
+constexpr double kOffItsSet = 2.0;  // tolerances: F has moved a row so far off its set
 constexpr int kRefinements = 3;
 constexpr double kSettles = 0.1;    // changes of the rate in the last of them
 constexpr double kRounding = 1e-9;  // of the terms: differences of g know no less
@@ -55,8 +55,8 @@ std::string FirstSteps::check(const Candidate& candidate, const StepData& step, 
   return found;
 }
 
-// With |y| below a tolerance in the norm of the error test, y = 0 would pass as well. One that has
-// come from above, or still grows, says nothing.
+// If |y| is below a tolerance in the norm of the error test, y = 0 would pass the test as well. A
+// solution that has decayed, or still grows, is no fault of the tolerances.
 std::string FirstSteps::compare_with_tolerances(const Candidate& candidate, const StepData& step,
                                                 double h, N_Vector corrected) {
   if (!work_) work_ = OwnedVector(candidate.base);
@@ -74,7 +74,7 @@ std::string FirstSteps::compare_with_tolerances(const Candidate& candidate, cons
   return out.str();
 }
 
-// All that a comparison needs, so that none allocates.
+// Allocates the work space of all comparisons.
 void FirstSteps::allocate(const Candidate& candidate) {
   const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
   for (std::vector<double>* each : {&point_, &slope_, &moved_, &kept_point_, &kept_slope_})
@@ -85,8 +85,8 @@ void FirstSteps::allocate(const Candidate& candidate) {
     if (!*each) *each = OwnedVector(candidate.base);
 }
 
-// C y' + g_t = 0 at the corrector's point, where y' fulfils F. C y' costs a product with the C at
-// hand; only where a row stands out is g evaluated.
+// Tests C y' + g_t = 0 at the corrector's point, where y' satisfies F. C y' costs a product with
+// the present C; g is evaluated only for a row that stands out.
 std::string FirstSteps::find_false_rows(const Candidate& candidate, const StepData& step, double h,
                                         N_Vector corrected, const double* id, Mover& mover,
                                         Corrector& corrector) {
@@ -123,8 +123,8 @@ std::string FirstSteps::find_false_rows(const Candidate& candidate, const StepDa
   return {};
 }
 
-// max(u, 0) keeps one side only: on the other there is nothing to move. point_ is the corrector's.
-// Hosts that take rows out have many that vanish: they are looked at together.
+// Finds a row such as max(u, 0), which is zero on one side of its set. point_ is the corrector's.
+// Hosts that switch rows off have many that vanish; all are tested together.
 std::string FirstSteps::one_sided_row(double t) {
   std::vector<int> rows;
   for (std::size_t i = 0; i < tangency_.tolerance.size(); ++i)
@@ -140,8 +140,8 @@ std::string FirstSteps::one_sided_row(double t) {
   return {};
 }
 
-// One iteration towards the y' that fulfils F at point_: neither what IDA's convergence test left
-// nor the distance from the constraints is in it. `ycor` begins as the corrector's.
+// Refines y' by one iteration for F at point_. It then contains neither the rest that IDA's
+// convergence test allows nor the distance from the constraints. `ycor` begins as the corrector's.
 bool FirstSteps::refine_slope(const Candidate& candidate, const StepData& step, const double* id,
                               N_Vector ycor, Corrector& corrector) {
   N_VScale(1.0, candidate.base, base_);
@@ -162,7 +162,7 @@ bool FirstSteps::refine_slope(const Candidate& candidate, const StepData& step, 
   return true;
 }
 
-// How fast an unknown, or t, goes through its size.
+// Largest relative rate of an unknown, or of t.
 double FirstSteps::fastest(double t) const {
   double rate = 1.0 / std::max(1.0, std::abs(t));
   for (std::size_t j = 0; j < point_.size(); ++j)
@@ -170,8 +170,8 @@ double FirstSteps::fastest(double t) const {
   return rate;
 }
 
-// dg/dt along slope_ by differences of g, which know no C. To both sides, of which F may know one
-// only: where F jumps, a row that it keeps has a kink.
+// dg/dt along slope_ by differences of g, independent of C, to either side. Where F jumps, a row
+// that it keeps has a kink, and only one side agrees.
 double FirstSteps::rate_along(int row, double t) {
   const double dt = std::cbrt(2e-16) / fastest(t);
   bool known = true;
@@ -191,7 +191,7 @@ double FirstSteps::rate_along(int row, double t) {
   return std::abs(ahead) < std::abs(behind) ? ahead : behind;
 }
 
-// Returns the fault of the row.
+// Returns the fault of the row, or an empty text.
 std::string FirstSteps::false_row(int row, Change& change, double noticed,
                                   const Candidate& candidate, const StepData& step,
                                   const double* id, N_Vector corrected, Corrector& corrector) {

@@ -1,4 +1,4 @@
-// Tether: doubts in rows and tolerances, in the first steps (method, section 9).
+// Tether: checks of rows and tolerances in the first steps (method, section 9).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace tether::ida_projection {
 
-/// The sum of the terms of C y' may be this part of them at an invariant: y' is known better.
+/// At an invariant the terms of C y' cancel to less than this part of their size.
 constexpr double kNoInvariant = 1e-2;
 /// Advice about a row that F does not keep, at the end of a message.
 constexpr const char* kRowAdvice =
@@ -22,20 +22,20 @@ constexpr const char* kRowAdvice =
 /// Rows that F does not keep, wrong entries of C, tolerances above the solution.
 class FirstSteps {
  public:
-  /// Accepted steps in which rows and tolerances are looked at.
+  /// Number of accepted steps in which rows and tolerances are checked.
   static constexpr long kSteps = 100;
 
   FirstSteps(const Constraints& constraints, Statistics& statistics)
       : constraints_(constraints), evaluator_(constraints, statistics) {}
 
   void reset();  ///< a new run starts
-  /// Is there anything to look at in the step after so many?
+  /// Whether the step after `steps` accepted ones is checked.
   static bool looks(long steps) {
     return steps >= kSettled && (steps <= kSteps || steps % kEvery == 0);
   }
-  /// Has a row been named that F does not keep?
+  /// Whether a row was named that F does not keep.
   bool false_row_found() const { return false_row_found_; }
-  /// Names a row that moves nothing but algebraic variables that F determines; empty: none.
+  /// Names a row that would move only algebraic variables that F determines; empty: there is none.
   const std::string& idle_row() const { return idle_row_; }
   /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
   /// ycor. Returns the fault found; empty: none.
@@ -57,7 +57,7 @@ class FirstSteps {
   struct Change {
     double sum = 0.0, span = 0.0;  // of C y' over time, and the time
     double verified = 0.0;         // what a better y' left of the sums so far
-    double limit = 1.0;            // of the next sum to be looked into
+    double limit = 1.0;            // of the sum from which on it is verified
   };
   bool refine_slope(const Candidate& candidate, const StepData& step, const double* id,
                     N_Vector ycor, Corrector& corrector);

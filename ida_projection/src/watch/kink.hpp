@@ -7,9 +7,9 @@
 
 namespace tether::ida_projection {
 
-extern const char* const kKink;  ///< what to say of one
+extern const char* const kKink;  ///< text of a message about a kink
 
-/// Is `given`, the entry of C in that row and column at y, the slope of g to one side only?
+/// Whether `given`, the entry of C in that row and column at y, is the slope of g to one side only.
 bool has_kink(const Constraints& constraints, int row, int column, double given, double t,
               std::vector<double> y);
 
@@ -17,11 +17,12 @@ bool has_kink(const Constraints& constraints, int row, int column, double given,
 /// none, or g refuses a point nearby.
 std::string wrong_entry(const Constraints& constraints, double t, const std::vector<double>& y);
 
-/// Do slopes of the row to both sides differ, by much of the largest? 2 N + 1 evaluations of g.
+/// Whether slopes of the row to both sides differ by a large part of the largest slope. Costs 2 N +
+/// 1 evaluations of g.
 bool has_kink(const Constraints& constraints, int row, double t, std::vector<double> y);
 
-/// Those of the rows that seem to hold one side of their set only: g_i stays as it is to one side
-/// along some direction, and moves to the other. Five evaluations of g for all of them.
+/// Those of the rows that seem to hold on one side of their set only: along some direction g_i is
+/// constant to one side and changes to the other. Costs five evaluations of g for all rows.
 std::vector<int> one_sided(const Constraints& constraints, const std::vector<int>& rows, double t,
                            const std::vector<double>& y);
 

@@ -9,8 +9,8 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Failures in one step, of which IDA gives up after ten. It finds its first step by trying: a
-// thousandth of the interval at first, then a quarter of that each time.
+// Failures in one step after which they are printed; IDA gives up after ten. More are normal in the
+// first step, whose size IDA finds by trying.
 constexpr int kSayAfter = 4, kSayAfterAtFirst = 8;
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }

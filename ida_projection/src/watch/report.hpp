@@ -1,4 +1,4 @@
-// Tether: status and message of the plugin, and warnings said once.
+// Tether: status and message of the plugin; each warning is printed once.
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
@@ -26,12 +26,12 @@ class Report {
   int finish(Status outcome, const std::string& text, long steps);
   /// The same for an exception, which must not pass through IDA's C functions.
   int caught(Status outcome, const char* text) noexcept;
-  /// Is the next failure in the step after `steps` one of those that are said?
+  /// Whether the next failure in the step after `steps` is printed.
   bool says_failures(long steps) const;
-  /// The reason why IDA rejects most steps, or results are doubtful; `said`: on stderr.
+  /// Keeps the reason why IDA rejects most steps or results are doubtful; prints `said` on stderr.
   void warn(Status kind, const std::string& text, const std::string& said);
   void warn(Status kind, const std::string& text) { warn(kind, text, text); }
-  /// On stderr, where Options::print allows it.
+  /// Prints on stderr if Options::print is set.
   void say(const std::string& text) const;
   /// A new run starts.
   void reset();

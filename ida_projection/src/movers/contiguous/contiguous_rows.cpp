@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
 constexpr int kMostRateSearches = 16;
-constexpr int kEarly = 64;       // factorisations, of a start
-constexpr double kAlike = 0.05;  // of a sum of squares
+constexpr int kEarly = 64;       // factorisations that belong to the start of a run
+constexpr double kAlike = 0.05;  // relative change of a sum of squares
 
 }  // namespace
 
@@ -46,8 +46,9 @@ Status ContiguousRows<Rows>::structure(const Candidate& candidate, const double*
   return status;
 }
 
-// Level of each unknown in rows that are measured in tolerances; empty: there is one only. Not by
-// the entries that are zero now: at rest those of positions in rows of velocities are.
+// Level of each unknown in the rows that are measured in tolerances; empty if there is one level.
+// Structural entries count, also those that are zero now: at rest the entries of positions in rows
+// of velocities are.
 template <class Rows>
 const std::vector<int>& ContiguousRows<Rows>::levels() {
   if (levels_known_) return found_levels_;
@@ -81,8 +82,8 @@ void ContiguousRows<Rows>::find_rates() {
   fill_metric();
 }
 
-// Are as many unknowns and rows of level 1 as of level 0 there, and the unknowns as large as their
-// rates? With an energy there is a row more, which at rest asks the positions.
+// Whether levels 0 and 1 have equally many unknowns and rows, and unknowns and rates are of equal
+// size. An energy is one row more.
 template <class Rows>
 bool ContiguousRows<Rows>::first_are_rates_of_zeroth(const std::vector<int>& levels) {
   double rates = 0.0, values = 0.0;
@@ -109,7 +110,7 @@ bool ContiguousRows<Rows>::first_are_rates_of_zeroth(const std::vector<int>& lev
 // C at the present y, and g if wanted.
 template <class Rows>
 Status ContiguousRows<Rows>::rows(double t, double* g) {
-  // Only differences and mixed rows need to know how large a tolerance is.
+  // Only differences and mixed rows need the size of a tolerance.
   const double* WT = evaluator_.uses_differences() || blocks_.mixed() ? at_.WT().data() : nullptr;
   Status status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT, g);
   if (status == Status::success && blocks_.outgrown()) {
@@ -145,7 +146,7 @@ Status ContiguousRows<Rows>::factor(double t, bool refill) {
   return Status::success;
 }
 
-// Factors from which it can be seen which rows are independent. False: an entry is not finite.
+// Factors that show which rows are independent. False: an entry is not finite.
 template <class Rows>
 bool ContiguousRows<Rows>::decide() {
   ++statistics_.factorizations;
@@ -159,7 +160,7 @@ bool ContiguousRows<Rows>::decide() {
   return true;
 }
 
-// Algebraic columns do not count: they follow the others, and out of the error test.
+// Algebraic columns do not count: they follow the others, and are not in the error test.
 template <class Rows>
 double ContiguousRows<Rows>::length_of_solution() {
   ++statistics_.iterations;
@@ -182,7 +183,8 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
     const double alone = found.length;
     found.length = judge_thin_rows(alone);
     if (!moved_ && blocks_.trust.must_learn(found.length)) {
-      // The firm rows' move shows how C turns; then all rows are judged, from the start.
+      // The move of the firm rows shows how C turns. Then all rows are judged at the start of the
+      // move.
       for (const Block* block : {&blocks_.d, &blocks_.a})
         if (!block->rows.empty())
           block->for_columns(
@@ -196,7 +198,7 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
       found.length = judge_thin_rows(length_of_solution());
     }
   }
-  // A polish moves few rows by too little to tell.
+  // A polish of few rows is too short to show it.
   const bool tells = how != Solve::rest || traits.measures_rest;
   if (Rows::kKeepsRank && tells && !dropped_follow()) {
     uses_.lasting = false;
@@ -210,8 +212,8 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
   return found;
 }
 
-// Which of the thin rows take part until the next factors, after a solution of this length with all
-// of them; the length with those.
+// After a solution of this length with all rows: decides which thin rows take part until the next
+// factorisation. Returns the length of the solution with those.
 template <class Rows>
 double ContiguousRows<Rows>::judge_thin_rows(double length) {
   if constexpr (Rows::kThinRows) {
@@ -225,7 +227,7 @@ double ContiguousRows<Rows>::judge_thin_rows(double length) {
       return length_of_solution();
     };
     const bool whole = !blocks_.dropped_rows();
-    // Nothing magnifies the right-hand side of the firm rows.
+    // Firm rows do not magnify their right-hand side.
     const int firm = RowTrust::firm_rows(solver);
     const double firm_length = by(firm);
     solver.use_rank(all);
@@ -238,15 +240,15 @@ double ContiguousRows<Rows>::judge_thin_rows(double length) {
   return length;
 }
 
-// After a move of this length: by how much has C turned?
+// After a move of this length: measures by how much C has turned.
 template <class Rows>
 Status ContiguousRows<Rows>::learn_trust(double length) {
   return told(blocks_.learn_trust(evaluator_, t_, at_.y.data(), WT_of_differences(), length));
 }
 
-// After a solution: do the rows that it leaves out follow from the others? Rows that an earlier
-// step has dropped are satisfied only while they depend on the others; where they ask for more, in
-// tolerances, than they did then, one may have become independent.
+// After a solution: whether the dropped rows follow from the kept ones. They are satisfied only
+// while they depend on these. If they ask for a longer move than when they were dropped, one of
+// them may have become independent.
 template <class Rows>
 bool ContiguousRows<Rows>::dropped_follow() {
   if (!blocks_.dropped_rows()) return true;
@@ -326,14 +328,13 @@ void ContiguousRows<Rows>::reset() {
   levels_known_ = false;
 }
 
-// Does the rounding of its own terms explain g_i?
+// Whether the rounding of its own terms explains g_i.
 template <class Rows>
 bool ContiguousRows<Rows>::only_rounding(std::size_t i) const {
   return std::abs(g_[i]) <= 64.0 * kEpsilon * blocks_.terms(static_cast<int>(i), at_.y.data());
 }
 
-// Every g_i? Then there is nothing to enforce, however short the tolerances are that the metric
-// would make of it.
+// Whether it explains every g_i. Then there is nothing to enforce, however long the move would be.
 template <class Rows>
 bool ContiguousRows<Rows>::rounding_only() {
   for (std::size_t i = 0; i < g_.size(); ++i)
@@ -341,9 +342,9 @@ bool ContiguousRows<Rows>::rounding_only() {
   return true;
 }
 
-// Length of the move that the rounding of g asks for in the worst case, with the present factors:
-// at most sum_i |dy_i|, dy_i the move for row i alone. Where that would take many solves it is
-// bounded by sqrt(m sum_i |dy_i|^2), the sum of squares by moves for all rows with random signs.
+// Length of the move that the rounding of g asks for in the worst case, with the current factors:
+// at most sum_i |dy_i|, dy_i the move for row i alone. If that would take many solves the bound is
+// sqrt(m sum_i |dy_i|^2), where moves for all rows with random signs estimate the sum of squares.
 template <class Rows>
 double ContiguousRows<Rows>::rounding_length() {
   kept_g_ = g_;

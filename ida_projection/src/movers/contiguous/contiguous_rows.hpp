@@ -18,7 +18,7 @@
 namespace tether::ida_projection {
 
 constexpr int kFewForLevels = 16;  // rows
-constexpr double kFollows = 0.25;  // of Options::tolerance, by rows that are left out
+constexpr double kFollows = 0.25;  // of Options::tolerance: dropped rows may ask for such a move
 
 /// `Rows` keeps C and its factors: DenseRows or SparseRows.
 template <class Rows>
@@ -78,8 +78,8 @@ class ContiguousRows final : public RowsAt {
   void accept() override { metric_.accept(); }
   void reset() override;
   bool use_levels(bool on) override;
-  // Few rows make no rough moves. Where rows are about to depend on each other, at singular
-  // positions, F answers to any move, stiff or not.
+  // Few rows make no rough moves. At singular positions, where rows are nearly dependent, F
+  // responds to any move, stiff or not.
   bool may_use_levels() const override {
     return count() > kFewForLevels && !uses_.thin && !blocks_.dropped_rows();
   }

@@ -1,4 +1,4 @@
-// Tether: few rows given by their gradients, as VectorMover wants them.
+// Tether: storage of few rows given by their gradients, for VectorRows.
 // SPDX-License-Identifier: BSD-3-Clause
 #include "movers/vector/gradient_store.hpp"
 

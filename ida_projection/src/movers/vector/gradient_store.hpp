@@ -1,4 +1,4 @@
-// Tether: few rows given by their gradients, as VectorMover wants them.
+// Tether: storage of few rows given by their gradients, for VectorRows.
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
@@ -26,7 +26,7 @@ class GradientStore {
   Status factor(const VectorMetric& metric, N_Vector terms_at);
   /// In the metric D, for tolerances WT.
   Status factor(N_Vector D, N_Vector WT);
-  /// Until the next factor() only rows that are independent by so much take part.
+  /// Until the next factor() only rows whose independent part is at least `least` take part.
   void keep_firm(double least) { rows_.keep_firm(least); }
   void solve(N_Vector D, N_Vector dy) { rows_.solve(g_, D, dy); }
   /// For other values than g.

@@ -10,8 +10,8 @@
 
 namespace tether::ida_projection {
 
-/// s, the size of the corrector's changes, D made of it (method, eq. 9, 10), and WT = 1/w. `spare`:
-/// a vector whose content may go.
+/// The local metric by vector operations: s, D (method, eq. 9, 10) and WT = 1/w. `spare` is work
+/// space.
 class VectorMetric {
  public:
   VectorMetric(const Options& options, N_Vector like)
@@ -28,7 +28,7 @@ class VectorMetric {
   }
   /// Components that are zero in `id` do not move.
   void hold_all_but(N_Vector id) { N_VProd(free_, id, free_); }
-  /// s <- max(0.8 s, |correction|) for accept(); of two spare vectors.
+  /// s <- max(0.8 s, |correction|), which accept() keeps; uses two vectors as work space.
   void update_scale(const Candidate& candidate, OwnedVector& changes, OwnedVector& spare) {
     if (!local()) return;
     N_VAbs(candidate.correction, changes);
