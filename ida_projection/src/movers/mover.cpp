@@ -250,9 +250,9 @@ Status Mover::remove_rest(const Candidate& candidate, double reach) {
     if (found.status != Status::success) return found.status;
     if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
     if ((still_ && age_ > 0) || !rows_->traits.gives_g)
-      break;  // by next to nothing, which says nothing about its rate
+      break;  // the move is too short to show a rate
     const double length = found.length;
-  // Cheap moves allow the rate to be measured on this candidate.
+    // Cheap moves allow the rate to be measured on this candidate.
     const double expected =
         cheap ? length * (k > 0 ? length / previous : kLeft) : curvature_.left(reach, length);
     const bool enough_done = (k > 0 || cheap || !measure) && expected <= enough;
