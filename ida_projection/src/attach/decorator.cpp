@@ -17,6 +17,8 @@ namespace tether::ida_projection {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr long kSampleEvery = 16;
 constexpr double kSudden = 10.0;     // times the last accepted move: longer ones follow a jump of F
 constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
@@ -41,7 +43,7 @@ int Projection::Impl::initialize() {
   test_all_again();
   run_.start = OwnedVector();
   run_.undetermined.clear();
-  run_.linear_solver = LinearSolverKind();
+  run_.iterative.reset();
   options_.advanced.metric = wanted_metric_;
   attempts_ = Attempts();
   attempts_.left_before = std::numeric_limits<double>::infinity();
@@ -57,36 +59,6 @@ int Projection::Impl::initialize() {
   metric_choice_.reset();
   return corrector_.initialize();
 }
-
-// Times the first projection and every 16th one, since reading the clock costs as much as a small
-// projection. The residual after the projection is measured in the same ones.
-class Projection::Impl::Stopwatch {
- public:
-  explicit Stopwatch(Impl& owner) : owner_(owner) {
-    if (owner.run_.engaged) start();
-  }
-  ~Stopwatch() {
-    if (!running_) return;
-    const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
-    Tally& tally = owner_.tally_;
-    const bool first = tally.attempts == 1;
-    (first ? tally.first_seconds : tally.seconds) += seconds;
-    if (!first) ++tally.timed;
-  }
-  bool running() const { return running_; }
-  void start() {
-    running_ = owner_.tally_.attempts++ % kSampleEvery == 0;
-    if (running_) begin_ = Clock::now();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Impl& owner_;
-  bool running_ = false;
-  Clock::time_point begin_;
-};
 
 int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
                             bool call_setup, void* mem) {
@@ -172,14 +144,16 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
   const StepData step = ida_.step();
   begin_move(candidate, step);
   if (const std::optional<int> ended = watch_rejections(candidate, step)) return *ended;
-  Stopwatch stopwatch(*this);
   if (!run_.engaged) {
     if (const std::optional<int> done = measure_before_engaging(candidate)) return *done;
-    stopwatch.start();
     const Status engaged = engage(candidate);
     if (engaged != Status::success) return finish(engaged, movers_.used->message());
   }
-  bool fresh = call_setup || !corrector_.has_setup();  // IDA's factors cannot be renewed
+  // Reading the clock costs as much as a small projection: the first one is timed, which finds out
+  // what the others keep, and every 16th for the others. These see what g is left, too.
+  const bool first = tally_.attempts == 0, sampled = tally_.attempts++ % kSampleEvery == 0;
+  const auto begin = sampled ? Clock::now() : Clock::time_point();
+  bool fresh = call_setup || !corrector_.has_setup();  // of IDA's factors there are no better ones
   Moved move = move_and_polish(candidate, step.cj, tolerance, fresh);
   while (move.status == Status::success && !move.corrector_was_right && !fresh &&
          in_use(Mechanism::repeated_correction)) {
@@ -192,20 +166,30 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
     fresh = true;
     move = move_and_polish(candidate, step.cj, tolerance, fresh);
   }
-  if (stopwatch.running()) move.drift_after = movers_.used->remaining_drift(candidate);
-  account(move, step, stopwatch.running());
+  if (sampled) {
+    move.drift_after = movers_.used->remaining_drift(candidate);
+    if (move.status == Status::success)
+      statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, move.drift_after);
+    statistics_.seconds += std::chrono::duration<double>(Clock::now() - begin).count() *
+                           (first ? 1.0 : static_cast<double>(kSampleEvery));
+  }
+  account(move, step);
   if (move.status == Status::success) {
     check_start(move);
     check_for_doubts(candidate, step);
   }
-  if (move.status == Status::not_converged)
-    return finish(move.status, with_suspicion(movers_.used->message(), candidate));
+  // Moves that do not converge: a wrong C as a rule. Looked into where it is to be said.
+  if (move.status == Status::not_converged && report_.says_failures(attempts_.steps)) {
+    const std::string text = movers_.used->message();
+    return finish(move.status,
+                  text + watch_.rejections.suspicion(candidate, corrector_, attempts_.steps));
+  }
   return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
 }
 
 // Prepares the move of a candidate that the corrector has found.
 void Projection::Impl::begin_move(Candidate& candidate, const StepData& step) {
-  if (!run_.linear_solver.known()) find_linear_solver_kind();
+  if (!run_.iterative) find_linear_solver_kind();
   account_for_previous_attempt(step);
   candidate.t = step.t;
   if (control_.starts_off_equations(attempts_.steps)) leave_out_of_error_test(false);
@@ -295,12 +279,11 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   attempts_.pending = false;
 }
 
-void Projection::Impl::account(const Move& move, const StepData& step, bool sampled) {
+void Projection::Impl::account(const Move& move, const StepData& step) {
   Statistics& s = statistics_;
   ++(move.looked ? s.skipped : s.projections);
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
-  if (sampled) s.largest_drift_after = std::max(s.largest_drift_after, move.drift_after);
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
   s.largest_move = std::max(s.largest_move, move.length);
   tally_.move_sum += move.length;

@@ -16,20 +16,8 @@ constexpr int kRefusedStarts = 5;  // failed error tests of the first step; IDA 
 
 }  // namespace
 
-// Adds the likely cause to the text about moves that do not converge, as a rule a wrong C. It is
-// diagnosed at most once a step.
-std::string Projection::Impl::with_suspicion(std::string text, const Candidate& candidate) {
-  if (!report_.says_failures(attempts_.steps)) return text;
-  if (attempts_.suspected != attempts_.steps) {
-    attempts_.suspected = attempts_.steps;
-    attempts_.suspicion = watch_.rejections.suspicion(candidate, corrector_);
-  }
-  return std::move(text) + attempts_.suspicion;
-}
-
-// From a start off the constraints, moves do not shrink with the step. Moves above
-// Options::largest_move are reported by name. Shorter ones fail IDA's error test, whose message
-// does not name the cause, so that it is named here.
+// From a start off the constraints moves do not shrink with the step. Above Options::largest_move
+// they are refused by name, below IDA's error test refuses them, with words of its own.
 void Projection::Impl::check_start(const Move& move) {
   if (attempts_.steps != 0) return;
   const double before = std::exchange(attempts_.first_move, move.length);

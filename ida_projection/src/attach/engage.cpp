@@ -29,9 +29,16 @@ bool Projection::Impl::rows_of_field() const {
   return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
 }
 
+// There is no getter for the type of IDA's linear solver, but direct ones count no iterations and
+// iterative ones, with a Jacobian of their own or without, do from the first right-hand side that
+// is not zero.
 void Projection::Impl::find_linear_solver_kind() {
-  run_.linear_solver.find(ida_, attempts_.steps);
-  const bool iterative = run_.linear_solver.iterative();
+  long iterations = 0, preconditioners = 0, jacobians = 0;
+  IDAGetNumLinIters(ida_.mem(), &iterations);
+  IDAGetNumPrecEvals(ida_.mem(), &preconditioners);
+  IDAGetNumJacEvals(ida_.mem(), &jacobians);
+  const bool iterative = iterations > 0 || preconditioners > 0;
+  if (iterative || (jacobians > 0 && attempts_.steps > 0)) run_.iterative = iterative;
   if (wanted_metric_ == Metric::automatic)
     options_.advanced.metric =
         iterative && rows_of_field() ? Metric::error_weights : Metric::local_correction;

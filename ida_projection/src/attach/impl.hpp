@@ -9,13 +9,11 @@
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
-#include <type_traits>
 #include <utility>
 
 #include "host/corrector.hpp"
 #include "host/ida.hpp"
 #include "host/ida_lifetime.hpp"
-#include "host/linear_solver.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
@@ -25,8 +23,8 @@
 #include "step/polish.hpp"
 #include "step/step_control.hpp"
 #include "watch/bypass.hpp"
-#include "watch/collapse.hpp"
 #include "watch/first_steps.hpp"
+#include "watch/rejections.hpp"
 #include "watch/report.hpp"
 
 namespace tether::ida_projection {
@@ -107,10 +105,6 @@ class Projection::Impl {
     bool& flag_;
     bool before_;
   };
-  class Stopwatch;
-  struct FreeSolver {
-    void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFreeEmpty(solver); }
-  };
   enum class Probe { none, asked, answered };
 
   // The attempt that IDA has not yet judged, and the last step.
@@ -126,8 +120,6 @@ class Projection::Impl {
     // attempt.
     double left_before = 0.0, left = 0.0;
     std::string capped_message;
-    long suspected = -1;      // the step whose failures were diagnosed last
-    std::string suspicion;    // the diagnosis
     double first_move = 0.0;  // of the last attempt at the first step, in tolerances
     int refused_starts = 0;   // attempts at it with a move that does not shrink
   };
@@ -150,7 +142,7 @@ class Projection::Impl {
   bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
   bool polishes_first();
   bool may_change_metric() const;
-  void account(const Move& move, const StepData& step, bool sampled);
+  void account(const Move& move, const StepData& step);
   int finish(Status outcome, const std::string& text);
 
   // engage.cpp
@@ -167,7 +159,6 @@ class Projection::Impl {
   Status engage(const Candidate& candidate);
 
   // doubts.cpp
-  std::string with_suspicion(std::string text, const Candidate& candidate);
   void check_start(const Move& move);
   void check_for_doubts(const Candidate& candidate, const StepData& step);
   void keep_point_before(const Candidate& candidate, OwnedVector& y);
@@ -208,18 +199,19 @@ class Projection::Impl {
     OwnedVector weights;  // for points between steps and initial values
   };
   struct Watches {
+    RowFaults faults;
     RejectionWatch rejections;
     FirstSteps first_steps;
     BypassWatch bypass;
   };
   struct Run {
     bool initialized = false;
-    bool broken = false;      // an exception left things half done: the run cannot go on
-    bool suppressed = false;  // IDASetId and IDASetSuppressAlg are this plugin's
-    bool engaged = false;     // the policy acts from the first move that was needed
-    LinearSolverKind linear_solver;
-    OwnedVector start;         // its first y, of contiguous vectors
-    std::string undetermined;  // multipliers at the start, or where correctors fail
+    bool broken = false;            // an exception left things half done: the run cannot go on
+    bool suppressed = false;        // IDASetId and IDASetSuppressAlg are this plugin's
+    bool engaged = false;           // the policy acts from the first move that was needed
+    std::optional<bool> iterative;  // IDA's linear solver, once it is known
+    OwnedVector start;              // its first y, of contiguous vectors
+    std::string undetermined;       // multipliers at the start, or where correctors fail
   };
   struct Inquiry {  // make_consistent() looks around
     Probe probe = Probe::none;
@@ -229,9 +221,6 @@ class Projection::Impl {
   struct Tally {
     double move_sum = 0.0;
     long attempts = 0;  // since moves began
-    // Every 16th attempt is timed. The first one is counted apart: it makes what the others reuse.
-    double first_seconds = 0.0, seconds = 0.0;
-    long timed = 0;  // after the first
   };
 
   Constraints constraints_;
@@ -247,7 +236,7 @@ class Projection::Impl {
   Movers movers_;
   PointProjection point_;
   Watches watch_;
-  std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeSolver> solver_;  // IDA sees it
+  Owned<SUNNonlinearSolver, SUNNonlinSolFreeEmpty> solver_;  // IDA sees it
   std::unique_ptr<Companion> sensitivities_, gradient_;
   Unknowns unknowns_;
   Metric wanted_metric_;

@@ -7,46 +7,6 @@
 
 namespace tether::ida_projection {
 
-const char* to_string(Status status) {
-  switch (status) {
-    case Status::unused:
-      return "unused";
-    case Status::success:
-      return "success";
-    case Status::not_converged:
-      return "not converged";
-    case Status::move_too_long:
-      return "move too long";
-    case Status::inconsistent:
-      return "inconsistent constraints";
-    case Status::not_finite:
-      return "not finite";
-    case Status::callback_recoverable:
-      return "callback failed, recoverable";
-    case Status::corrector_failed:
-      return "corrector failed";
-    case Status::collapsed:
-      return "steps collapsed";
-    case Status::doubtful:
-      return "doubtful";
-    case Status::callback_fatal:
-      return "callback failed";
-    case Status::late_attach:
-      return "attached too late";
-    case Status::simultaneous_sensitivities:
-      return "simultaneous sensitivities";
-    case Status::never_called:
-      return "never called";
-    case Status::out_of_memory:
-      return "out of memory";
-    case Status::misused:
-      return "misused";
-    case Status::internal_error:
-      return "internal error";
-  }
-  return "unknown";
-}
-
 namespace {
 
 // A vector of the host's problem; refuses an IDA that has none.
@@ -79,8 +39,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       control_(ida_, options_, statistics_),
       movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
-      watch_{RejectionWatch(constraints_), FirstSteps(constraints_, statistics_),
-             BypassWatch(ida_, lifetime_)},
+      watch_{RowFaults(constraints_, statistics_), RejectionWatch(&watch_.faults),
+             FirstSteps(constraints_, watch_.faults), BypassWatch(ida_, lifetime_)},
       wanted_metric_(options_.advanced.metric) {
   N_Vector like = vector_of(ida_mem);
   check_running_indices(like);
@@ -181,10 +141,6 @@ Statistics Projection::Impl::statistics() {
   s.steps_without_plugin = watch_.bypass.steps();
   const long moved = s.projections - s.failures();
   s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
-  s.seconds = tally_.first_seconds;
-  if (tally_.timed > 0)
-    s.seconds += tally_.seconds / static_cast<double>(tally_.timed) *
-                 static_cast<double>(tally_.attempts - 1);
   return s;
 }
 

@@ -63,11 +63,7 @@ class Corrector {
   void forget_stop() { stop_flag_ = 0; }
 
  private:
-  struct Free {
-    void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
-  };
-
-  std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, Free> own_;
+  Owned<SUNNonlinearSolver, SUNNonlinSolFree> own_;
   SUNNonlinearSolver inner_ = nullptr;
   SUNNonlinSolSysFn system_ = nullptr;
   SUNNonlinSolLSolveFn linear_solve_ = nullptr;

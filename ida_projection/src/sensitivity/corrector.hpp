@@ -73,14 +73,6 @@ class SensitivityCorrector final : public Companion {
   }
 
  private:
-  struct FreeSolver {
-    void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
-  };
-  struct FreeShell {
-    void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFreeEmpty(solver); }
-  };
-  using Solver = std::remove_pointer_t<SUNNonlinearSolver>;
-
   std::string set_up(N_Vector predicted);
   void use_rows_of_state();
   void note_setups(double cj);
@@ -103,9 +95,9 @@ class SensitivityCorrector final : public Companion {
   tether_idas_functions idas_;
   ParameterDerivative g_p_;
   bool contiguous_;
-  std::unique_ptr<Solver, FreeSolver> own_;
+  Owned<SUNNonlinearSolver, SUNNonlinSolFree> own_;
   std::unique_ptr<Corrector> corrector_;
-  std::unique_ptr<Solver, FreeShell> solver_;  // IDAS sees it
+  Owned<SUNNonlinearSolver, SUNNonlinSolFreeEmpty> solver_;  // IDAS sees it
 
   const Constraints* moved_ = nullptr;  // the caller's rows, or joined with equations of F
   std::unique_ptr<TangentRows> rows_;

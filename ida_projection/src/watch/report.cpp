@@ -2,8 +2,7 @@
 #include "watch/report.hpp"
 
 #include <cstdio>
-
-#include "host/shortest.hpp"
+#include <utility>
 
 namespace tether::ida_projection {
 
@@ -15,7 +14,39 @@ constexpr int kSayAfter = 4, kSayAfterAtFirst = 8;
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 
+// The name of each status, and what counts it as a failure of a projection.
+struct Outcome {
+  Status status;
+  const char* name;
+  long Statistics::*count = nullptr;
+};
+constexpr Outcome outcomes[] = {
+    {Status::unused, "unused"},
+    {Status::success, "success"},
+    {Status::not_converged, "not converged", &Statistics::not_converged},
+    {Status::move_too_long, "move too long", &Statistics::move_too_long},
+    {Status::inconsistent, "inconsistent constraints", &Statistics::inconsistent},
+    {Status::not_finite, "not finite", &Statistics::not_finite},
+    {Status::callback_recoverable, "callback failed, recoverable",
+     &Statistics::callback_recoverable},
+    {Status::corrector_failed, "corrector failed"},
+    {Status::collapsed, "steps collapsed"},
+    {Status::doubtful, "doubtful"},
+    {Status::callback_fatal, "callback failed", &Statistics::callback_fatal},
+    {Status::late_attach, "attached too late"},
+    {Status::simultaneous_sensitivities, "simultaneous sensitivities"},
+    {Status::never_called, "never called"},
+    {Status::out_of_memory, "out of memory"},
+    {Status::misused, "misused"},
+    {Status::internal_error, "internal error"}};
+
 }  // namespace
+
+const char* to_string(Status status) {
+  for (const Outcome& outcome : outcomes)
+    if (outcome.status == status) return outcome.name;
+  return "unknown";
+}
 
 int Report::finish(Status outcome, const std::string& text, long steps) {
   status = outcome;
@@ -24,36 +55,13 @@ int Report::finish(Status outcome, const std::string& text, long steps) {
     return 0;
   }
   message = text;
-  count(outcome);
-  if (is_fatal(outcome)) print_fatal(message.c_str());
-  if (!is_fatal(outcome)) count_failure_in_step(text, steps);
+  for (const Outcome& counted : outcomes)
+    if (counted.status == outcome && counted.count != nullptr) ++(statistics_.*counted.count);
+  if (is_fatal(outcome))
+    print_fatal(message.c_str());
+  else
+    count_failure_in_step(text, steps);
   return is_fatal(outcome) ? kFatal : kRecoverable;
-}
-
-void Report::count(Status outcome) {
-  Statistics& s = statistics_;
-  switch (outcome) {
-    case Status::not_converged:
-      ++s.not_converged;
-      break;
-    case Status::move_too_long:
-      ++s.move_too_long;
-      break;
-    case Status::inconsistent:
-      ++s.inconsistent;
-      break;
-    case Status::not_finite:
-      ++s.not_finite;
-      break;
-    case Status::callback_recoverable:
-      ++s.callback_recoverable;
-      break;
-    case Status::callback_fatal:
-      ++s.callback_fatal;
-      break;
-    default:
-      break;
-  }
 }
 
 int Report::caught(Status outcome, const char* text) noexcept {
@@ -69,8 +77,7 @@ int Report::caught(Status outcome, const char* text) noexcept {
 
 // Once: IDA reports the failure of the run by itself.
 void Report::print_fatal(const char* text) noexcept {
-  if (!options_.print || printed_) return;
-  printed_ = true;
+  if (!options_.print || std::exchange(printed_, true)) return;
   std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
 }
 
@@ -80,23 +87,26 @@ bool Report::says_failures(long steps) const {
 }
 
 void Report::count_failure_in_step(const std::string& text, long steps) {
-  const bool say_it = says_failures(steps) && !said_failures_;
+  const bool say_it = says_failures(steps);
   failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
   failing_step_ = steps;
-  if (!say_it) return;
-  said_failures_ = true;
-  PlainText out;
-  out << "step " << steps + 1 << " was tried " << failures_in_step_
-      << " times without a point on the constraints: " << text;
-  say(out.str());
+  if (say_it)
+    say_once(Status::not_converged, "step " + std::to_string(steps + 1) + " was tried " +
+                                        std::to_string(failures_in_step_) +
+                                        " times without a point on the constraints: " + text);
 }
 
 void Report::warn(Status kind, const std::string& text, const std::string& said) {
   warning_ = text;
   warning_status_ = kind;
+  say_once(kind, said);
+}
+
+// A bit for each kind: not again after every IDAReInit.
+void Report::say_once(Status kind, const std::string& text) {
   const unsigned bit = 1U << static_cast<unsigned>(kind);
-  if ((said_warnings_ & bit) == 0) say(said);  // not again after every IDAReInit
-  said_warnings_ |= bit;
+  if ((said_ & bit) == 0) say(text);
+  said_ |= bit;
 }
 
 void Report::say(const std::string& text) const {

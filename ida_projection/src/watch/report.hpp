@@ -48,19 +48,18 @@ class Report {
   const std::string& text() const { return message.empty() ? warning_ : message; }
 
  private:
-  void count(Status outcome);
   void count_failure_in_step(const std::string& text, long steps);
   void print_fatal(const char* text) noexcept;
+  void say_once(Status kind, const std::string& text);
 
   const Options& options_;
   Statistics& statistics_;
   std::string warning_;
   Status warning_status_ = Status::success;
-  unsigned said_warnings_ = 0;  // a bit for each kind
+  unsigned said_ = 0;  // kinds of warnings
   bool printed_ = false;
   long failing_step_ = -1;
   int failures_in_step_ = 0;
-  bool said_failures_ = false;
 };
 
 }  // namespace tether::ida_projection
