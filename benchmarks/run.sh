@@ -4,7 +4,7 @@
 #
 #   sh benchmarks/run.sh [--quick] [--output DIR] [--contact FOLDER] [--build DIR]
 #
-#   --quick     fewer problems and tolerances: under 2 minutes instead of under 20
+#   --quick     fewer problems and tolerances
 #   --output    where index.html, results.json and the tables go (default build/benchmarks)
 #   --contact   folder of contact problems (fclib files) for contact_collection
 #   --build     an existing build directory instead of build/release

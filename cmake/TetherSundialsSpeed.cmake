@@ -1,5 +1,5 @@
 # Warns of a SUNDIALS that was built without optimisation: Debian's is, and one built by its own CMake
-# without a build type. Its vectors and its dense solver then take three times the time and more.
+# without a build type. Its vectors and its dense solver then are several times slower.
 # SPDX-License-Identifier: BSD-3-Clause
 #
 # Sets TETHER_SUNDIALS_OPTIMISED in the cache: ON, OFF, or nothing where it cannot be found out (cross
@@ -46,7 +46,7 @@ _tether_measure_sundials()
 if(DEFINED TETHER_SUNDIALS_OPTIMISED AND NOT TETHER_SUNDIALS_OPTIMISED STREQUAL ""
    AND NOT TETHER_SUNDIALS_OPTIMISED)
   message(WARNING "SUNDIALS ${TetherSundials_VERSION} was built without optimisation: IDA's own work takes "
-    "about three times as long as it could. Results are the same. For speed build it with\n"
+    "longer than it could. Results are the same. For speed build it with\n"
     "  sh benchmarks/optimised_sundials.sh build/sundials\n"
     "(or from its source with -DCMAKE_BUILD_TYPE=Release) and configure with "
     "-DCMAKE_PREFIX_PATH=<that folder>. fast_vector() and fast_dense_solver() make up for most of it. "

@@ -67,7 +67,7 @@ function(tether_by_folders target)
   endif()
 endfunction()
 
-# A third of the time of many small sources. Builds without TETHER_UNITY_BUILD show a missing include.
+# Saves reading the same headers for many small sources. Builds without TETHER_UNITY_BUILD show a missing include.
 function(tether_precompile target)
   if(TETHER_UNITY_BUILD)
     target_precompile_headers(${target} PRIVATE ${ARGN})

@@ -1,6 +1,6 @@
 #!/bin/sh
-# All tests: installs what is missing, builds all but the programs of benchmarks/ (a tenth of the time) in
-# build/release and runs ctest.
+# All tests: installs missing packages, builds all but the programs of benchmarks/ in build/release and
+# runs ctest.
 # Arguments go to ctest, e.g. -R projection. SPDX-License-Identifier: BSD-3-Clause
 set -eu
 

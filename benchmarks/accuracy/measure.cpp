@@ -92,7 +92,7 @@ class Session {
   std::size_t size() const { return jobs_.size(); }
   std::vector<Point> take() { return std::move(points_); }
 
-  // First runs bind functions of libraries and touch their memory: half of the time of a short one.
+  // First runs bind functions of libraries and touch their memory, which would distort short runs.
   void warm_up(double tolerance) const {
     const Limits brief{plan_.steps, std::min(0.05, plan_.run_seconds)};
     for (const Job& job : jobs_) job.code->run(*job.problem, tolerance, brief, {});

@@ -10,7 +10,7 @@
 namespace tether::contact::detail {
 namespace {
 
-// Measured on stacks, lattices, heaps and packings (ns).
+// Prices in ns, fitted to times of stacks, lattices, heaps and packings.
 constexpr double kInFours = 22;       // a contact and sweep
 constexpr double kAlone = 48;         // the same of one that is in no group of four
 constexpr double kAssembly = 250;     // a block
@@ -50,7 +50,8 @@ AssemblyPrice::AssemblyPrice(const ContactGraph& graph, const Island& island,
   sweep_ = kInFours * in_fours + kAlone * (island.contacts - in_fours);
 }
 
-// 4 ns for each product of blocks, and what is linear (InteriorPoint::cost, BodyNewton::cost).
+// The price of products of blocks, and terms in proportion to the contacts, as in
+// InteriorPoint::cost and BodyNewton::cost.
 double AssemblyPrice::factorisation() {
   if (factorisation_ >= 0) return factorisation_;
   const int n = island_.contacts, bodies = island_.body_end - island_.body_begin;

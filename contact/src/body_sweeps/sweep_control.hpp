@@ -95,9 +95,9 @@ class BestPoint {
   double change_ = kNone, last_ = kNone, residual_ = kNone;
 };
 
-// The sweeps that are still needed, forecast after 5, 10, 20, 40, ... sweeps from the convergence
-// since half as many. A change is the least in its half: where contacts toggle between stick and
-// slip single sweeps change ten times as much.
+// Forecasts the sweeps that are still needed, after 5, 10, 20, 40, ... sweeps, from the convergence
+// in the last half of them. The least change of a half counts, because single sweeps change more
+// where contacts toggle between stick and slip.
 class Forecast {
  public:
   static constexpr int kFirst = 5;

@@ -1,12 +1,11 @@
 // Tether: the arc on which maximum dissipation slides; a text for one and for four contacts
 // (law/real.hpp), included twice and without a guard. SPDX-License-Identifier: BSD-3-Clause
 //
-// Shared are the equation, its bracket and the direction of its root. The search for the root is
+// The equation, its bracket and the direction of its root are shared. The search for the root is
 // not: one contact takes Halley's steps, four take Newton's, and the end is a division here and a
-// product with the inverse there. One search for both moves the last bits of all results; it would
-// cost about the same (instructions: Newton's for one contact -0.7 % of its solves, Halley's for
-// four +0.3 % of a packing). The branch around the warm start is for one contact: without it the
-// compiler fuses another product, and the bits move.
+// product with the inverse there. One search for both would cost about the same, but change the
+// last bits of all results. The branch around the warm start is for one contact: without it the
+// compiler fuses another product, and the bits change.
 
 // With u at angle phi from u0 = y*/|y*| and t = tan(phi/2): the derivative of the energy along the
 // visible arc is the quartic sum q_i t^i, negative at `lo` and positive at `hi`, after reflection

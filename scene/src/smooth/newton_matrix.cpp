@@ -57,9 +57,9 @@ Int given_order(Int count, Int*, Int*, Int* order, Common* settings) {
   return -1;
 }
 
-// KLU's own orders are for any matrix: AMD takes multipliers, whose diagonal is zero, before their
-// bodies, pivots then leave its order, and the fill is large (net of 20 x 20 balls: ten times the
-// time); COLAMD leaves the diagonal from the start.
+// KLU's own orders serve any matrix. AMD takes multipliers, whose diagonal is zero, before their
+// bodies; pivots then leave its order, and the fill is large. COLAMD leaves the diagonal from the
+// start.
 void use_order(SUNLinearSolver solver, std::vector<int>& order) {
   constexpr int kOwnOrder = 3;
   auto* settings = SUNLinSol_KLUGetCommon(solver);
