@@ -16,16 +16,6 @@ constexpr double kUnseen = 0.003;   // tolerances: allowed error of a forecast d
 constexpr double kNotStiff = 0.03;  // tolerances: |delta + kappa ycor| up to which F is not stiff
 constexpr int kWait = 30;
 
-// Length of factor ycor + delta, in tolerances.
-double length(const double* w, double factor, const double* ycor, const double* delta, int n) {
-  double sum = 0.0;
-  for (int i = 0; i < n; ++i) {
-    const double part = (factor * ycor[i] + delta[i]) * w[i];
-    sum += part * part;
-  }
-  return std::sqrt(sum / n);
-}
-
 }  // namespace
 
 // The share of ycor in delta.
@@ -56,28 +46,6 @@ void PolishForecast::learn(N_Vector weights, N_Vector ycor, N_Vector delta, doub
   used_in_row_ = 0;
   N_VLinearSum(1.0, delta, kappa(cj), ycor, work_);
   not_stiff_ = N_VWrmsNorm(work_, weights) <= kNotStiff;
-}
-
-void PolishForecast::learn(const double* w, const double* ycor, const double* delta, int n,
-                           double cj) {
-  double* beyond = N_VGetArrayPointer(beyond_);
-  if (wait_ > 0) --wait_;
-  const bool told = known(cj);
-  const double share = told ? -share_at(cj) : 0.0;
-  double square = 0.0, product = 0.0, missed = 0.0;
-  for (int i = 0; i < n; ++i) {
-    const double weighted = ycor[i] * w[i], miss = (share * ycor[i] + delta[i] - beyond[i]) * w[i];
-    square += weighted * weighted;
-    product += weighted * w[i] * delta[i];
-    missed += miss * miss;
-  }
-  if (told) followed(std::sqrt(missed / n) <= kUnseen);
-  share_ = square > 0.0 ? product / square : 0.0;
-  if (!told) patience_ = length(w, -share_, ycor, delta, n) <= kUnseen ? 1 : 0;
-  for (int i = 0; i < n; ++i) beyond[i] = -share_ * ycor[i] + delta[i];
-  cj_ = cj;
-  used_in_row_ = 0;
-  not_stiff_ = length(w, kappa(cj), ycor, delta, n) <= kNotStiff;
 }
 
 }  // namespace tether::ida_projection

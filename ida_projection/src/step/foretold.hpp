@@ -25,8 +25,6 @@ class PolishForecast {
   void doubt();
   /// Learns from a computed delta.
   void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj);
-  /// The same of n entries.
-  void learn(const double* weights, const double* ycor, const double* delta, int n, double cj);
   /// Whether delta can be forecast for a correction with this cj.
   bool tells(double cj) const { return used_in_row_ < patience_ && wait_ == 0 && known(cj); }
   void tell(double cj, N_Vector ycor, N_Vector delta) const {

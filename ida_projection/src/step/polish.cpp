@@ -34,16 +34,8 @@ constexpr double kNeedsResponseOfMultipliers = 0.01;  // the same for multiplier
 
 void Polish::allocate(N_Vector like, bool contiguous) {
   contiguous_ = contiguous;
-  delta_ = OwnedVector(like);
-  corrected_ = OwnedVector(like);
-  work_ = OwnedVector(like);
-  noise_ = OwnedVector(like);
-  residual_ = OwnedVector(like);
-  if (!contiguous) return;
-  size_ = static_cast<int>(N_VGetLength(like));
-  delta_entries_ = N_VGetArrayPointer(delta_);
-  corrected_entries_ = N_VGetArrayPointer(corrected_);
-  work_entries_ = N_VGetArrayPointer(work_);
+  for (OwnedVector* each : {&delta_, &corrected_, &work_, &noise_, &residual_})
+    *each = OwnedVector(like);
 }
 
 bool Polish::wanted(double length, bool smoothing) const {
@@ -65,28 +57,12 @@ double Polish::longest_without_response(bool smoothing) const {
 
 void Polish::keep(const Candidate& candidate) {
   noise_known_ = step_known_ = false;
-  if (contiguous_)
-    for (int j = 0; j < size_; ++j) corrected_entries_[j] = candidate.correction_entries[j];
-  else
-    N_VScale(1.0, candidate.correction, corrected_);
+  N_VScale(1.0, candidate.correction, corrected_);
 }
 
 // F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to
 // IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
 bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
-  if (contiguous_) {
-    double* base = candidate.base_entries;
-    for (int j = 0; j < size_; ++j) {
-      work_entries_[j] = base[j];
-      base[j] += candidate.correction_entries[j] - corrected_entries_[j];
-    }
-    const bool evaluated = corrector_.residual(corrected_, delta_) == 0;
-    for (int j = 0; j < size_; ++j) {
-      base[j] = work_entries_[j];
-      delta_entries_[j] = -delta_entries_[j];
-    }
-    return evaluated && corrector_.solve_linear(delta_);
-  }
   N_VScale(1.0, candidate.base, work_);
   N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
   N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
@@ -125,7 +101,7 @@ const double* Polish::response(const StepData& step) {
   N_VScale(1.0, residual_, step.residual);
   if (!known) return nullptr;
   N_VLinearSum(1.0, delta_, -algebraic_factor(step.cj), noise_, work_);
-  return work_entries_;
+  return N_VGetArrayPointer(work_);
 }
 
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
@@ -143,6 +119,10 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
   const double algebraic = algebraic_factor(cj);
   // A change longer than IDA's stopping test allows is no refinement: the Jacobian is stale.
   const double length = differential_length(candidate, delta_);
+  if (!std::isfinite(variables_.any() ? N_VWrmsNorm(delta_, candidate.weights) : length)) {
+    N_VConst(0.0, delta_);
+    return {true, false};
+  }
   if (!asked) learn_pattern(candidate, cj);
   const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
@@ -154,10 +134,7 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
 void Polish::learn_pattern(const Candidate& candidate, double cj) {
   if (!may_forecast_) return;
   if (variables_.any() || corrector_.iterations() != 1) return forecast_.forget();
-  if (contiguous_)
-    forecast_.learn(candidate.weight_entries, corrected_entries_, delta_entries_, size_, cj);
-  else
-    forecast_.learn(candidate.weights, corrected_, delta_, cj);
+  forecast_.learn(candidate.weights, corrected_, delta_, cj);
 }
 
 // ycor <- ycor + delta, if delta can be forecast.
@@ -166,62 +143,22 @@ bool Polish::forecast_polish(const Candidate& candidate, double cj, double toler
   forecast_.tell(cj, corrected_, delta_);
   if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisledFactor * tolerance)) return false;
   forecast_.used();
-  if (contiguous_) {
-    for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
-    return true;
-  }
   N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
   return true;
 }
 
-// WRMS length of v, delta_ or work_, over the differential variables.
-double Polish::differential_length(const Candidate& candidate, N_Vector v) {
-  if (!contiguous_) {
-    if (!variables_.any()) return N_VWrmsNorm(v, candidate.weights);
-    N_VProd(variables_.id(), v, work_);
-    return N_VWrmsNorm(work_, candidate.weights);
-  }
-  const double* entries = v == delta_ ? delta_entries_ : work_entries_;
-  const double* id = variables_.mask();
-  double sum = 0.0;
-  if (id == nullptr) {
-    for (int j = 0; j < size_; ++j)
-      sum +=
-          (entries[j] * candidate.weight_entries[j]) * (entries[j] * candidate.weight_entries[j]);
-    return std::sqrt(sum / size_);
-  }
-  for (int j = 0; j < size_; ++j) {
-    const double change = entries[j] * candidate.weight_entries[j];
-    sum += id[j] != 0.0 ? change * change : 0.0;
-  }
-  return std::sqrt(sum / size_);
+double Polish::differential_length(const Candidate& candidate, N_Vector v) const {
+  return variables_.any() ? N_VWrmsNormMask(v, candidate.weights, variables_.id())
+                          : N_VWrmsNorm(v, candidate.weights);
 }
 
-// delta_d <- differential * delta_d, delta_a <- algebraic * delta_a, ycor <- ycor + delta; a factor
-// of 0 also removes what is not finite.
+// delta_d <- differential * delta_d, delta_a <- algebraic * delta_a, ycor <- ycor + delta.
 void Polish::apply(const Candidate& candidate, double differential, double algebraic) {
-  if (contiguous_) {
-    const double* id = variables_.mask();
-    if (id == nullptr && differential == 1.0) {
-      double sum = 0.0;  // finite only where all entries are
-      for (int j = 0; j < size_; ++j) sum += delta_entries_[j];
-      if (std::isfinite(sum)) {
-        for (int j = 0; j < size_; ++j) candidate.correction_entries[j] += delta_entries_[j];
-        return;
-      }
-    }
-    for (int j = 0; j < size_; ++j) {
-      const double factor = id == nullptr || id[j] != 0.0 ? differential : algebraic;
-      double& delta = delta_entries_[j];
-      delta = factor == 0.0 || !std::isfinite(delta) ? 0.0 : factor * delta;
-      candidate.correction_entries[j] += delta;
-    }
-    return;
-  }
   if (variables_.any()) {
     N_VProd(variables_.id(), delta_, work_);
-    N_VLinearSum(algebraic, delta_, differential - algebraic, work_, delta_);
-  } else {
+    N_VLinearSum(1.0, delta_, -1.0, work_, delta_);
+    N_VLinearSum(algebraic, delta_, differential, work_, delta_);
+  } else if (differential != 1.0) {
     N_VScale(differential, delta_, delta_);
   }
   N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);

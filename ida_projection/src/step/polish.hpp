@@ -84,7 +84,8 @@ class Polish {
   bool newton_step_at_moved_point(const Candidate& candidate);
   bool forecast_polish(const Candidate& candidate, double cj, double tolerance);
   void learn_pattern(const Candidate& candidate, double cj);
-  double differential_length(const Candidate& candidate, N_Vector v);
+  /// WRMS over the differential variables.
+  double differential_length(const Candidate& candidate, N_Vector v) const;
   void apply(const Candidate& candidate, double differential, double algebraic);
 
   const Options& options_;
@@ -92,12 +93,10 @@ class Polish {
   Corrector& corrector_;
   const AlgebraicVariables& variables_;
   bool contiguous_ = false;
-  int size_ = 0;
   OwnedVector delta_, corrected_, work_, noise_, residual_;
   bool noise_known_ = false;  // -J^-1 F at corrected_
   bool step_known_ = false;   // delta_ is that of the present moved point
-  double *delta_entries_ = nullptr, *corrected_entries_ = nullptr, *work_entries_ = nullptr;
-  bool iterative_ = false;  // IDA's linear solver is a Krylov method
+  bool iterative_ = false;    // IDA's linear solver is a Krylov method
   double cj_at_setup_ = 0.0;
   PolishForecast forecast_;
   bool may_forecast_ = false;
