@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ida/ida.h>
+#include <utility>
 
 #include "step/step_smoothing.hpp"
 
@@ -11,163 +12,124 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kLogLarge = -0.36, kLogSmall = -1.2;  // of r: 0.7, 0.3
-constexpr double kLogLargeIfStiff = -0.6;              // 0.55
-constexpr int kSamples = 6, kSamplesAgain = 3;         // in the mean
-constexpr long kEarly = 10, kTrial = 40;          // steps with the limit; it is judged after them
-constexpr double kStopBelow = 0.5, kWorth = 0.9;  // of the step before it
-constexpr double kPatience = 0.5;                 // factor of these where vibrations are likely
-constexpr long kFirstSteps = 60;                  // steps in which a start excites stiff components
-constexpr long kFirstWait = 100;                  // steps, after a limit that did not pay
+constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6;  // of r: 0.7, 0.55
+constexpr double kLogSmall = -1.2;                            // 0.3
+constexpr int kSamples = 6;                                   // in the mean of log r
+constexpr double kWorth = 0.5;    // of the step before it
+constexpr long kFirstSteps = 60;  // a start excites what is stiff
+constexpr long kFirstWait = 100;  // steps, after a limit that did not pay
 constexpr int kTries = 8;
-constexpr double kPassed = 0.8;        // |ycor| / (k + 1) below which the error test is passed
-constexpr double kUnderflow = 1e-200;  // weights so small that squares of errors underflow to 0
+constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
+constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
 
 }  // namespace
 
 void OrderLimit::reset() {
   end();
-  on_ = wanted_;
-  stiff_ = false;
-  begun_ = 0;
-  early_ = acted_early_ = false;
-  pending_steps_ = -1;
-  samples_ = highest_ = 0;
-  kept_ = false;
-  not_before_ = 0;
-  wait_ = kFirstWait;
-  duration_ = 1;
+  now_ = State();
+  now_.on = wanted_;
+  now_.wait = kFirstWait;
 }
 
 void OrderLimit::end() {
-  if (phase_ == Phase::lowering) hold_step(false);
-  if (phase_ == Phase::limited) IDASetMaxOrd(ida_mem_, highest_);
-  phase_ = Phase::watching;
-  on_ = false;
+  if (now_.phase == Phase::lowering) hold_step(false);
+  if (now_.phase == Phase::limited) IDASetMaxOrd(ida_mem_, now_.highest);
+  now_.phase = Phase::watching;
+  now_.on = false;
 }
 
 void OrderLimit::note_differences(long steps, double ycor, double curvature) {
   int order = 1;
   IDAGetCurrentOrder(ida_mem_, &order);
-  pending_steps_ = -1;
-  if (order < (phase_ == Phase::limited || at_start(steps) ? kLimit : 3)) return;
+  now_.pending_steps = -1;
+  if (order < (now_.phase == Phase::limited || at_start(steps) ? kLimit : 3)) return;
   if (!(ycor > 0.0) || !(curvature > 0.0)) return;
-  pending_ = std::log(ycor / curvature) / (order - 1);
-  pending_steps_ = steps;
+  now_.pending = std::log(ycor / curvature) / (order - 1);
+  now_.pending_steps = steps;
 }
 
-// Updates the mean of the latest log r; each sample replaces a mean one.
-void OrderLimit::take_sample(long steps, int most) {
-  if (pending_steps_ < 0 || steps <= pending_steps_) return;
-  pending_steps_ = -1;
-  if (samples_ >= most) {
-    mean_ += (pending_ - mean_) / most;
-  } else {
-    mean_ = samples_ == 0 ? pending_ : (samples_ * mean_ + pending_) / (samples_ + 1);
-    ++samples_;
-  }
+// The mean of the latest log r: each new one replaces a mean one.
+void OrderLimit::take_sample(long steps) {
+  if (now_.pending_steps < 0 || steps <= now_.pending_steps) return;
+  now_.pending_steps = -1;
+  now_.samples = std::min(now_.samples + 1, kSamples);
+  now_.mean =
+      now_.samples == 1 ? now_.pending : now_.mean + (now_.pending - now_.mean) / now_.samples;
 }
 
 double OrderLimit::control(long steps, double t, double norm) {
-  if (!on_) return 1.0;
+  if (!now_.on) return 1.0;
   int order = 1;
   IDAGetCurrentOrder(ida_mem_, &order);
-  highest_ = std::max(highest_, order);
-  if (phase_ == Phase::watching)
+  now_.highest = std::max(now_.highest, order);
+  if (now_.phase == Phase::lowering) return lower(order, steps, t, norm);
+  take_sample(steps);
+  if (now_.phase == Phase::watching)
     watch(steps, order);
-  else if (phase_ == Phase::limited)
-    judge(steps, t);
   else
-    return lower(order, steps, t, norm);
+    judge(steps, t);
   return 1.0;
 }
 
-// A start excites stiff components, which orders 3 and 4, that IDA reaches after a few steps, do
-// not damp.
+// A start excites what is stiff; orders 3 and 4, which IDA has after a few steps, keep that up.
 bool OrderLimit::at_start(long steps) const {
-  return stiff_ && steps < kFirstSteps && begun_ == (acted_early_ ? 1 : 0);
+  return now_.stiff && steps < kFirstSteps && now_.begun == (now_.acted_early ? 1 : 0);
 }
 
 void OrderLimit::watch(long steps, int order) {
-  const int needed = kept_ ? kSamplesAgain : kSamples;
-  take_sample(steps, needed);
-  early_ = at_start(steps) && order > kLimit && (samples_ == 0 || mean_ > kLogLargeIfStiff);
-  if (early_) {
-    phase_ = Phase::lowering;
-    if (!acted_early_) ++begun_;
-    acted_early_ = true;
-    tries_ = 0;
-    return;
-  }
-  if (samples_ < needed || mean_ < (stiff_ ? kLogLargeIfStiff : kLogLarge) || steps < not_before_ ||
-      order <= kLimit)
-    return;
-  phase_ = Phase::lowering;
-  ++begun_;
-  tries_ = samples_ = 0;
-  IDAGetCurrentStep(ida_mem_, &step_before_);
+  if (order <= kLimit) return;
+  const double large = now_.stiff ? kLogLargeIfStiff : kLogLarge;
+  now_.early = at_start(steps) && (now_.samples == 0 || now_.mean > large);
+  const bool seen = now_.samples == kSamples && now_.mean >= large && steps >= now_.not_before;
+  if (!now_.early && !seen) return;
+  if (!now_.early || !std::exchange(now_.acted_early, true)) ++now_.begun;
+  if (!now_.early) now_.samples = 0;
+  now_.phase = Phase::lowering;
+  now_.tries = 0;
+  IDAGetCurrentStep(ida_mem_, &now_.step_before);
 }
 
-// IDA lowers its order by one if that does not increase the estimated error. Weights that underflow
-// make all estimates 0, and the error test void. They are used only where the test would be passed.
+// IDA lowers its order by one where that makes the estimated error no larger: weights that
+// underflow make all estimates 0. Only where the error test would be passed: it is not made then.
 double OrderLimit::lower(int order, long steps, double t, double norm) {
-  if (order <= kLimit && early_) {
-    hold_step(false);
-    phase_ = Phase::watching;
-    return 1.0;
-  }
   if (order <= kLimit) {
+    hold_step(false);
+    now_.phase = now_.early ? Phase::watching : Phase::limited;
+    if (now_.early) return 1.0;
     // IDA never raises the order beyond a limit that it has reached.
     IDASetMaxOrd(ida_mem_, kLimit);
-    hold_step(false);
-    phase_ = Phase::limited;
-    since_ = steps;
-    t_since_ = t;
-    trials_ = 0;
-    samples_ = 0;
-    pending_steps_ = -1;
+    now_.since = steps;
+    now_.t_since = t;
+    now_.pending_steps = -1;
     return 1.0;
   }
-  if (tries_ >= kTries) {  // IDA's estimates contain something else, such as sensitivities
+  if (now_.tries >= kTries) {  // something else, such as sensitivities, is in the error test
     end();
     return 1.0;
   }
   const bool passed = norm / (order + 1) <= kPassed;
   hold_step(passed);
-  if (!passed) return 1.0;
-  ++tries_;
-  return kUnderflow;
+  if (passed) ++now_.tries;
+  return passed ? kUnderflow : 1.0;
 }
 
+// Steps that became shorter tell that the limit does not pay; a vibration that a higher order
+// excites grows, however long its steps are.
 void OrderLimit::judge(long steps, double t) {
-  take_sample(steps, kSamples);
-  const long taken = steps - since_;
-  const bool early = taken == kEarly && trials_ == 0;
-  if (taken != kTrial && !early) return;
-  const double mean = std::abs(t - t_since_) / static_cast<double>(taken);
-  // A vibration that a higher order excites grows, so that longer steps of that order do not pay.
-  const double patience = stiff_ ? kPatience : 1.0;
-  if (mean < patience * (trials_ > 0 ? kWorth : kStopBelow) * std::abs(step_before_))
-    return release(steps, wait_);
-  if (early) return;
-  kept_ = kept_ || trials_ > 0;  // the first may pass before the oscillation is damped
-  since_ = steps;
-  t_since_ = t;
-  if (++trials_ >= duration_ && samples_ == kSamples && mean_ < kLogSmall) release(steps, 0);
-}
-
-void OrderLimit::release(long steps, long wait) {
-  IDASetMaxOrd(ida_mem_, highest_);
-  phase_ = Phase::watching;
-  samples_ = 0;
-  pending_steps_ = -1;
-  if (wait == 0) {
-    duration_ *= 2;
-  } else {
-    kept_ = false;
-    not_before_ = steps + wait;
-    if (!stiff_) wait_ *= 4;
-  }
+  const long taken = steps - now_.since;
+  if (taken != now_.trial) return;
+  const double mean = std::abs(t - now_.t_since) / static_cast<double>(taken);
+  const bool shorter = mean < kWorth * std::abs(now_.step_before);
+  const bool pays_no_more = now_.samples == kSamples && now_.mean < kLogSmall;
+  now_.since = steps;
+  now_.t_since = t;
+  if (!shorter && !pays_no_more) return;
+  IDASetMaxOrd(ida_mem_, now_.highest);
+  now_.phase = Phase::watching;
+  now_.samples = 0;
+  now_.pending_steps = -1;
+  if (shorter) now_.not_before = steps + std::exchange(now_.wait, 4 * now_.wait);
+  if (!shorter) now_.trial *= 2;
 }
 
 void OrderLimit::hold_step(bool hold) {

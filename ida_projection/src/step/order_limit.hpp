@@ -29,56 +29,58 @@ class OrderLimit {
       : ida_mem_(ida_mem), wanted_(options.advanced.limit_order) {}
 
   /// Stiff components have responded to moves: oscillations are likely, and expected at smaller r.
-  void expect_oscillations() { stiff_ = true; }
+  void expect_oscillations() { now_.stiff = true; }
   /// Before the first step.
   void reset();
   /// No limit for the rest of the run.
   void end();
   /// Whether y' of this attempt is kept, as that of the first of two steps in a row, or compared,
   /// as that of the second. `steps`: accepted before it.
-  bool keeps_slope(long steps) const { return on_ && steps % kEvery == 0; }
-  bool compares_slopes(long steps) const { return on_ && steps % kEvery == 1; }
+  bool keeps_slope(long steps) const { return now_.on && steps % kEvery == 0; }
+  bool compares_slopes(long steps) const { return now_.on && steps % kEvery == 1; }
   /// For such a second attempt: |ycor| and |h (y'_n - y'_{n-1})| in the norm of IDA's error test.
   void note_differences(long steps, double ycor, double curvature);
   /// At the end of each successful solve at time t. Returns by how much IDA's error weights are to
   /// be multiplied for the rest of this attempt; 1: left alone.
   double control(long steps, double t, double norm);
 
-  bool lowering() const { return phase_ == Phase::lowering; }
-  long begun() const { return begun_; }
+  bool lowering() const { return now_.phase == Phase::lowering; }
+  long begun() const { return now_.begun; }
 
  private:
   static constexpr int kLimit = 2;
   static constexpr long kEvery = 4;
   enum class Phase { watching, lowering, limited };
 
-  void take_sample(long steps, int most);
+  void take_sample(long steps);
   bool at_start(long steps) const;
   void watch(long steps, int order);
   double lower(int order, long steps, double t, double norm);
   void judge(long steps, double t);
-  void release(long steps, long wait);
   void hold_step(bool hold);
 
+  // From a new run on.
+  struct State {
+    bool on = false, stiff = false;
+    Phase phase = Phase::watching;
+    long begun = 0;
+    // of the differences
+    double pending = 0.0;  // log r of an attempt that IDA has not yet judged
+    long pending_steps = -1;
+    int samples = 0;
+    double mean = 0.0;  // of log r
+    int tries = 0, highest = 0;
+    bool early = false, acted_early = false;  // lowering in the first steps: now, ever
+    double step_before = 0.0;                 // the limit
+    long since = 0;                           // steps when it was judged last
+    long trial = 40;                          // steps with the limit until it is judged
+    double t_since = 0.0;
+    long not_before = 0, wait = 0;  // steps; after a limit that made the steps shorter
+  };
+
   void* ida_mem_;
-  bool wanted_, on_ = false, stiff_ = false;
-  Phase phase_ = Phase::watching;
-  long begun_ = 0;
-
-  // of the differences
-  double pending_ = 0.0;  // log r of an attempt that IDA has not yet judged
-  long pending_steps_ = -1;
-  int samples_ = 0;
-  double mean_ = 0.0;  // of log r
-
-  int tries_ = 0, highest_ = 0;
-  bool early_ = false, acted_early_ = false;  // lowering in the first steps: now, ever
-  bool kept_ = false;                         // a limit that made the steps no shorter
-  double step_before_ = 0.0;                  // the limit
-  long since_ = 0;                            // steps when it was judged last
-  double t_since_ = 0.0;
-  long trials_ = 0, duration_ = 1;  // of kTrial steps each, passed and at least wanted
-  long not_before_ = 0, wait_ = 0;  // after one that made the steps shorter
+  bool wanted_;
+  State now_;
 };
 
 }  // namespace tether::ida_projection
