@@ -15,8 +15,8 @@ namespace {
 constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6;  // of r: 0.7, 0.55
 constexpr double kLogSmall = -1.2;                            // 0.3
 constexpr int kSamples = 6;                                   // in the mean of log r
-constexpr double kWorth = 0.5;    // of the step before it
-constexpr long kFirstSteps = 60;  // a start excites what is stiff
+constexpr double kWorth = 0.5;                                // of the step before it
+constexpr long kFirstSteps = 60;                              // a start excites what is stiff
 constexpr long kFirstWait = 100;  // steps, after a limit that did not pay
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked

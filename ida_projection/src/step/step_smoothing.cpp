@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tether::ida_projection {
 
@@ -25,9 +26,6 @@ constexpr double kSetpoint = 4.0;   // sigma: errors are steered to 1 / sigma of
 constexpr double kFar = 0.5;        // of the setpoint
 constexpr double kOfOrder = 1.348;  // setpoints of neighbouring orders: 6^(1/6)
 
-// IDA's defaults.
-constexpr double kLowestFixed = 1.0, kHighestFixed = 2.0, kLargest = 2.0, kLow = 0.9, kMin = 0.5;
-
 }  // namespace
 
 StepSmoother::StepSmoother(void* ida_mem, const Options& options)
@@ -37,25 +35,18 @@ StepSmoother::StepSmoother(void* ida_mem, const Options& options)
       max_order_(options.advanced.maximum_order) {}
 
 void StepSmoother::reset() {
-  const bool was_on = on_;
-  on_ = owns_max_step_ = wanted_;
-  known_to_ida_ = false;
-  pending_ = has_previous_ = false;
-  steps_ = -1;
-  known_ = block_ = 0;
-  block_sum_ = 0.0;
-  ratio_ = 1.0;
-  care_ = Care();
-  refused_ = 0.0;
-  if (on_ || was_on) set(kLowestFixed, kHighestFixed, kLargest, 0.0, max_step_);
+  const bool was_on = std::exchange(on_, wanted_);
+  settings_.reset();
+  now_ = State();
+  if (on_ || was_on) set({1.0, 2.0, kLargest, 0.0, max_step_});
 }
 
-// sigma_k = prod_i i h / (h + h_{-1} + .. + h_{-i}), i = 1 .. k (Brenan, Campbell and
+// sigma_k = prod_i i h / (h + now_.h{-1} + .. + now_.h{-i}), i = 1 .. k (Brenan, Campbell and
 // Petzold, 5.2).
 double StepSmoother::error_constant(double h, int order) const {
   double sigma = 1.0, sum = h;
   for (int i = 1; i <= order; ++i) {
-    sum += i <= known_ ? past_[static_cast<std::size_t>(i - 1)] : h;
+    sum += i <= now_.known ? now_.past[static_cast<std::size_t>(i - 1)] : h;
     sigma *= i * h / sum;
   }
   return sigma;
@@ -65,7 +56,7 @@ double StepSmoother::error_constant(double h, int order) const {
 double StepSmoother::test_constant(double h, int order) const {
   double sum = h, newest = 1.0, alpha_0 = -1.0, alpha_s = -1.0;  // i = 0
   for (int i = 1; i <= order; ++i) {
-    sum += i <= known_ ? past_[static_cast<std::size_t>(i - 1)] : h;
+    sum += i <= now_.known ? now_.past[static_cast<std::size_t>(i - 1)] : h;
     newest = h / sum;
     if (i == order) break;
     alpha_0 -= newest;
@@ -75,29 +66,50 @@ double StepSmoother::test_constant(double h, int order) const {
 }
 
 void StepSmoother::attempt_was_accepted() {
-  for (std::size_t i = past_.size() - 1; i > 0; --i) past_[i] = past_[i - 1];
-  past_[0] = h_;
-  known_ = std::min(known_ + 1, kMaximumOrder);
-  if (h_ >= kNearRefused * refused_) refused_ = 0.0;
-  block_sum_ += log_c_;
-  ++block_;
-  if (order_ >= max_order_) {
-    previous_ = log_c_;
-    has_previous_ = true;
-  }
+  for (std::size_t i = now_.past.size() - 1; i > 0; --i) now_.past[i] = now_.past[i - 1];
+  now_.past[0] = now_.h;
+  now_.known = std::min(now_.known + 1, kMaximumOrder);
+  if (now_.h >= kNearRefused * now_.refused) now_.refused = 0.0;
+  now_.block_sum += now_.log_c;
+  ++now_.block;
+  if (now_.order >= max_order_) now_.previous = now_.log_c;
 }
 
 // A setpoint s makes steps shorter by s^(1/(k+1)). It depends on the order so that steps of all
 // orders become shorter by the same factor.
 double StepSmoother::setpoint(int order) const {
-  const double graded = care_.most * std::pow(kOfOrder, order - max_order_);
-  return kSetpoint * std::max(graded, std::min(care_.least, care_.most));
+  const double graded = now_.care.most * std::pow(kOfOrder, order - max_order_);
+  return kSetpoint * std::max(graded, std::min(now_.care.least, now_.care.most));
 }
 
 double StepSmoother::filter(double log_c, int order) const {
-  const double before = has_previous_ ? previous_ : log_c;
-  const double log_ratio = (log_c + before) / (kFilter * (order + 1)) - std::log(ratio_) / kFilter;
+  const double before = now_.previous.value_or(log_c);
+  const double log_ratio =
+      (log_c + before) / (kFilter * (order + 1)) - std::log(now_.ratio) / kFilter;
   return 1.0 + std::atan(std::exp(log_ratio) - 1.0);
+}
+
+// The last attempt, and what a new size or order h, `order` makes of it.
+void StepSmoother::note_previous(long steps, double h, int order) {
+  if (steps > now_.steps) {
+    attempt_was_accepted();
+  } else {
+    now_.previous.reset();  // rejected: IDA has cut the step by its own rule
+    now_.refused = now_.h;
+    now_.ratio = 1.0;
+    now_.end_block();
+  }
+  const bool same_order = order == now_.order;
+  const bool same_size = now_.known > 0 && h == now_.past[0];
+  if (!same_order) now_.previous.reset();
+  if (same_order && now_.known > 0 && !same_size)
+    now_.ratio = h / now_.past[0];
+  else if (!same_order || order >= max_order_)
+    now_.ratio = 1.0;
+  if (same_order && same_size) return;
+  if (same_order && order < max_order_ && now_.block > 0)
+    now_.previous = now_.block_sum / now_.block;
+  now_.end_block();
 }
 
 double StepSmoother::control(long steps, double norm) {
@@ -106,50 +118,22 @@ double StepSmoother::control(long steps, double norm) {
   IDAGetCurrentStep(ida_mem_, &h);
   IDAGetCurrentOrder(ida_mem_, &order);
   h = std::abs(h);
-  if (pending_) {
-    if (steps > steps_) {
-      attempt_was_accepted();
-    } else {
-      has_previous_ = false;  // rejected: IDA has cut the step by its own rule
-      refused_ = h_;
-      ratio_ = 1.0;
-      block_ = 0;
-      block_sum_ = 0.0;
-    }
-    if (order != order_) {
-      has_previous_ = false;
-      ratio_ = 1.0;
-    } else if (known_ > 0 && h != past_[0]) {
-      ratio_ = h / past_[0];
-    } else if (order >= max_order_) {
-      ratio_ = 1.0;
-    }
-    if (order != order_ || known_ == 0 || h != past_[0]) {
-      if (order == order_ && order < max_order_ && block_ > 0) {
-        previous_ = block_sum_ / block_;
-        has_previous_ = true;
-      }
-      block_ = 0;
-      block_sum_ = 0.0;
-    }
-  }
-
+  if (now_.steps >= 0) note_previous(steps, h, order);
   const double error = error_constant(h, order) * norm;
   const bool grows = 2.0 * error + 1e-4 <= 1.0;  // IDA's tmp >= 1
   const double log_c = -std::log(setpoint(order) * error + 1e-4);
-  pending_ = true;
-  steps_ = steps;
-  h_ = h;
-  order_ = order;
-  log_c_ = log_c;
+  now_.steps = steps;
+  now_.h = h;
+  now_.order = order;
+  now_.log_c = log_c;
   if (!std::isfinite(log_c)) {
     hold();
   } else if (!wanted_ && far_below(log_c, order) && !near_refused(kLargest * h)) {
     return request(kLargest, h, grows, norm);
   } else if (order >= max_order_) {
     return request(filter(log_c, order), h, grows, norm);
-  } else if (block_ + 1 >= order + 2) {  // with this one, k + 2 steps of one size
-    return request(filter((block_sum_ + log_c) / (block_ + 1), order), h, grows, norm);
+  } else if (now_.block + 1 >= order + 2) {  // with this one, k + 2 steps of one size
+    return request(filter((now_.block_sum + log_c) / (now_.block + 1), order), h, grows, norm);
   } else {
     hold();
   }
@@ -162,22 +146,21 @@ bool StepSmoother::far_below(double log_c, int order) const {
 }
 
 // Keep h, or reduce it by IDA's own rule.
-void StepSmoother::hold() { set(kLowestFixed, kAnyRatio, kLargest, 0.0, max_step_); }
+void StepSmoother::hold() { set({1.0, kAnyRatio, kLargest, 0.0, max_step_}); }
 
 // `grows`: IDA's own ratio is 1 or more.
 double StepSmoother::request(double ratio, double h, bool grows, double norm) {
-  if (!grows) {
-    if (ratio < 1.0)
-      set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
-    else
-      set(0.0, kAnyRatio, kLargest, 0.0, max_step_);
+  if (!grows && ratio < 1.0) {
+    set({1.0, kAnyRatio, kLargest, ratio, max_step_});
+  } else if (!grows) {
+    set({0.0, kAnyRatio, kLargest, 0.0, max_step_});
   } else if (ratio > 1.0) {
-    set(kLowestFixed, 1.0, ratio, 0.0, max_step_);
-  } else if (!owns_max_step_) {
+    set({1.0, 1.0, ratio, 0.0, max_step_});
+  } else if (!wanted_) {
     return reduce_by_weights(ratio, h, norm);
   } else {
     const double longest = h * ratio;
-    set(kLowestFixed, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest);
+    set({1.0, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest});
   }
   return 1.0;
 }
@@ -187,30 +170,29 @@ double StepSmoother::request(double ratio, double h, bool grows, double norm) {
 // which compares errors, does not change.
 double StepSmoother::reduce_by_weights(double ratio, double h, double norm) {
   constexpr double kAsked = 0.55, kPassed = 0.95;
-  const double factor = kAsked / (error_constant(h, order_) * norm);
-  if (!(factor > 1.0) || factor * test_constant(h, order_) * norm > kPassed) {
+  const double factor = kAsked / (error_constant(h, now_.order) * norm);
+  if (!(factor > 1.0) || factor * test_constant(h, now_.order) * norm > kPassed) {
     hold();
     return 1.0;
   }
-  set(kLowestFixed, kAnyRatio, kLargest, ratio, max_step_);
+  set({1.0, kAnyRatio, kLargest, ratio, max_step_});
   return factor;
 }
 
-// Calls IDA's setters only for values that have changed.
-void StepSmoother::set(double lowest_fixed, double highest_fixed, double largest, double low,
-                       double max_step) {
-  const Settings now{lowest_fixed, highest_fixed, largest, low, max_step};
-  const bool all = !known_to_ida_;
-  if (all || now.lowest_fixed != set_.lowest_fixed || now.highest_fixed != set_.highest_fixed)
-    IDASetEtaFixedStepBounds(ida_mem_, lowest_fixed, highest_fixed);
-  if (all || now.largest != set_.largest) IDASetEtaMax(ida_mem_, largest);
-  if (all || now.low != set_.low) {
-    IDASetEtaLow(ida_mem_, low > 0.0 ? low : kLow);
-    IDASetEtaMin(ida_mem_, low > 0.0 ? low : kMin);
+// IDA checks what each function is given: those whose value stays are left out.
+void StepSmoother::set(const Settings& to) {
+  const auto changes = [&](double Settings::*value) {
+    return !settings_ || (*settings_).*value != to.*value;
+  };
+  if (changes(&Settings::lowest_fixed) || changes(&Settings::highest_fixed))
+    IDASetEtaFixedStepBounds(ida_mem_, to.lowest_fixed, to.highest_fixed);
+  if (changes(&Settings::largest)) IDASetEtaMax(ida_mem_, to.largest);
+  if (changes(&Settings::low)) {
+    IDASetEtaLow(ida_mem_, to.low > 0.0 ? to.low : 0.9);
+    IDASetEtaMin(ida_mem_, to.low > 0.0 ? to.low : 0.5);
   }
-  if (owns_max_step_ && (all || now.max_step != set_.max_step)) IDASetMaxStep(ida_mem_, max_step);
-  set_ = now;
-  known_to_ida_ = true;
+  if (wanted_ && changes(&Settings::max_step)) IDASetMaxStep(ida_mem_, to.max_step);
+  settings_ = to;
 }
 
 }  // namespace tether::ida_projection

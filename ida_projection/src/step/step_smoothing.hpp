@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <tether/ida_projection/options.hpp>
 
 namespace tether::ida_projection {
@@ -39,12 +40,12 @@ class StepSmoother {
   /// used. The setpoint is `care.most` times the usual one.
   void begin(const Care& care) {
     on_ = true;
-    known_to_ida_ = false;
-    care_ = care;
+    settings_.reset();
+    now_.care = care;
   }
   bool on() const { return on_; }
   /// The corrector failed at this step size.
-  void refuse(double h) { refused_ = h; }
+  void refuse(double h) { now_.refused = h; }
   /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
   /// norm of IDA's error test. Returns by how much IDA's error weights are to be multiplied for
   /// the rest of this attempt (1: left alone); see reduce_by_weights().
@@ -52,46 +53,56 @@ class StepSmoother {
 
  private:
   static constexpr int kMaximumOrder = 5;
+  static constexpr double kLargest = 2.0;      // growth of h in a step, by IDA's default
   static constexpr double kNearRefused = 0.9;  // of a rejected size: as large as that size
 
+  void note_previous(long steps, double h, int order);
   void attempt_was_accepted();
   double setpoint(int order) const;
   double error_constant(double h, int order) const;
   double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;
   bool far_below(double log_c, int order) const;
-  bool near_refused(double h) const { return refused_ > 0.0 && h >= kNearRefused * refused_; }
+  bool near_refused(double h) const {
+    return now_.refused > 0.0 && h >= kNearRefused * now_.refused;
+  }
   void hold();
   double request(double ratio, double h, bool grows, double norm);
   double reduce_by_weights(double ratio, double h, double norm);
-  void set(double lowest_fixed, double highest_fixed, double largest, double low, double max_step);
-
+  // What IDA is told; its defaults but for the bounds of steps that keep their size.
   struct Settings {
-    double lowest_fixed = 0.0, highest_fixed = 0.0, largest = 0.0, low = 0.0, max_step = 0.0;
+    double lowest_fixed = 1.0, highest_fixed = 2.0;  // IDASetEtaFixedStepBounds
+    double largest = kLargest;
+    double low = 0.0;  // IDASetEtaLow and IDASetEtaMin; 0: as IDA has them
+    double max_step = 0.0;
+  };
+  void set(const Settings& settings);
+
+  // From a new run on.
+  struct State {
+    Care care;
+    long steps = -1;  // accepted before the attempt that IDA has not yet judged; -1: there is none
+    double h = 0.0, log_c = 0.0;  // of it
+    int order = 0;
+    std::array<double, kMaximumOrder> past{};  // accepted sizes, the latest first
+    int known = 0;                             // of these
+    double refused = 0.0;            // size of the last attempt that failed, until one is accepted
+    double ratio = 1.0;              // of the last change of h
+    std::optional<double> previous;  // log c before the present step or block
+    double block_sum = 0.0;          // of log c over the steps of one size and order
+    int block = 0;
+    void end_block() {
+      block = 0;
+      block_sum = 0.0;
+    }
   };
 
   void* ida_mem_;
-  Settings set_;               // IDA has these
-  bool known_to_ida_ = false;  // if so
-  bool wanted_, on_ = false, owns_max_step_ = false;
+  std::optional<Settings> settings_;  // IDA has these
+  bool wanted_, on_ = false;
   double max_step_;
-  Care care_;
   int max_order_;
-
-  // the attempt that IDA has not yet judged
-  bool pending_ = false;
-  double h_ = 0.0, log_c_ = 0.0;
-  int order_ = 0;
-  // accepted steps
-  long steps_ = -1;
-  std::array<double, kMaximumOrder> past_{};  // sizes, the latest first
-  int known_ = 0;
-  double refused_ = 0.0;   // size of the last attempt that failed, until one as long is accepted
-  double ratio_ = 1.0;     // of the last change of h
-  double previous_ = 0.0;  // log c before the present step or block
-  bool has_previous_ = false;
-  double block_sum_ = 0.0;  // of log c over the steps of one size and order
-  int block_ = 0;
+  State now_;
 };
 
 }  // namespace tether::ida_projection
