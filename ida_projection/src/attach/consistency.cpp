@@ -9,25 +9,38 @@ namespace tether::ida_projection {
 
 namespace {
 
-double largest_difference(const double* a, const double* b, int n, int* where) {
-  double largest = 0.0;
-  for (int i = 0; i < n; ++i)
-    if (std::abs(a[i] - b[i]) > largest) {
-      largest = std::abs(a[i] - b[i]);
-      if (where != nullptr) *where = i;
-    }
-  return largest;
+// Why there is no consistent start; ends make_consistent.
+struct NoStart {
+  Status status;
+  std::string text;
+};
+NoStart residual_ended() {
+  return {Status::callback_fatal, "F, the residual function, returned a negative flag"};
 }
 
-constexpr const char* kResidualEnded = "F, the residual function, returned a negative flag";
-
-// Largest |F_i|; -1 if F cannot be evaluated. `flag` is what F returned.
-double largest_residual(IDAResFn residual, void* user_data, double t, N_Vector y, N_Vector yp,
-                        int* flag) {
-  if (residual == nullptr) return -1.0;
+// Largest |F_i|; -1 if F cannot be evaluated.
+double largest_residual(const Consistency& how, double t, N_Vector y, N_Vector yp) {
+  if (how.residual == nullptr) return -1.0;
   OwnedVector r(y);
-  *flag = residual(t, y, yp, r, user_data);
-  return *flag == 0 ? N_VMaxNorm(r) : -1.0;
+  const int flag = how.residual(t, y, yp, r, how.user_data);
+  if (flag < 0) throw residual_ended();
+  return flag == 0 ? N_VMaxNorm(r) : -1.0;
+}
+
+// Largest change of a component, and where it is in contiguous vectors of n entries (n = 0: of
+// others).
+double largest_change(N_Vector from, N_Vector to, int n, int* where) {
+  OwnedVector change(to);
+  N_VLinearSum(1.0, to, -1.0, from, change);
+  const double* entries = n > 0 ? N_VGetArrayPointer(change) : nullptr;
+  double largest = 0.0;
+  for (int i = 0; i < n; ++i)
+    if (std::abs(entries[i]) > largest) {
+      largest = std::abs(entries[i]);
+      if (where != nullptr) *where = i;
+    }
+  const bool known = n == 0 && change->ops->nvmaxnorm != nullptr;
+  return known ? N_VMaxNorm(change) : largest;
 }
 
 }  // namespace
@@ -55,9 +68,7 @@ void Projection::Impl::project_jointly(const Candidate& candidate) {
 // Lets IDA attempt a step in which the decorated solver returns no correction. It records the error
 // weights and the algebraic variables meanwhile. IDA must be reinitialised afterwards.
 bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
-  OwnedVector y(yy), ydot(yp);
-  N_VScale(1.0, yy, y);
-  N_VScale(1.0, yp, ydot);
+  const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
   const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
   bool answered = false;
   const auto answers = [&](double tout) {
@@ -77,204 +88,167 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
   return answered;
 }
 
-// Makes y' and the algebraic variables consistent with F. Returns the reason of a failure, else an
-// empty text.
-std::string Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector ydot,
-                                              const Consistency& how, Status* failure) {
+// Makes y' and the algebraic variables consistent with F.
+void Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector ydot,
+                                       const Consistency& how) {
   using Derivative = Consistency::Derivative;
-  bool found = how.derivative == Derivative::keep;
-  *failure = Status::callback_fatal;
-  if (how.derivative == Derivative::automatic || how.derivative == Derivative::calc_ic) {
+  if (how.derivative == Derivative::keep) return;
+  if (how.derivative != Derivative::least_squares) {
     IDAReInit(ida_.mem(), t0, y, ydot);
     if (variables_.known()) {
       IDASetId(ida_.mem(), variables_.vector());
       const double direction =
           how.direction != 0.0 ? how.direction : t0 + 1e-3 * std::max(1.0, std::abs(t0));
       const int flag = IDACalcIC(ida_.mem(), IDA_YA_YDP_INIT, direction);
-      if (flag == IDA_RES_FAIL) return kResidualEnded;
-      found = flag == 0 && IDAGetConsistentIC(ida_.mem(), y, ydot) == 0;
+      if (flag == IDA_RES_FAIL) throw residual_ended();
+      if (flag == 0 && IDAGetConsistentIC(ida_.mem(), y, ydot) == 0) return;
     }
   }
-  if (!found && how.derivative != Derivative::calc_ic && how.residual != nullptr &&
-      unknowns_.contiguous) {
+  if (how.derivative != Derivative::calc_ic && how.residual != nullptr && unknowns_.contiguous) {
     const Status solved =
         consistent_derivative(how.residual, how.user_data, t0, y, ydot, variables_.vector(),
                               unknowns_.weights, how.maximum_iterations);
-    if (solved == Status::callback_fatal) return kResidualEnded;
-    found = solved == Status::success;
+    if (solved == Status::callback_fatal) throw residual_ended();
+    if (solved == Status::success) return;
   }
-  if (found) return "";
-  *failure = Status::not_converged;
-  return "y' consistent with F was not found; give Options::id and Consistency::residual, "
-         "or keep y' with Consistency::Derivative::keep";
+  throw NoStart{Status::not_converged,
+                "y' consistent with F was not found; give Options::id and Consistency::residual, "
+                "or keep y' with Consistency::Derivative::keep"};
 }
 
-// Moves y onto the constraints; algebraic variables only if rows or F determine them. Returns false
-// if IDA cannot start at this point.
-bool Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                                     ConsistencyReport* report, bool* jointly) {
+// Moves y onto the constraints; algebraic variables only if rows or F determine them. `jointly`: by
+// rows that were solved together with equations of F.
+ConsistencyReport Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot,
+                                                  const Consistency& how, bool* jointly) {
   JointStart joint{t0, y, how.hold, {}};
   inquiry_.joint_start = &joint;
   const bool answered = IDAReInit(ida_.mem(), t0, y, ydot) == 0 && probe(t0, y, ydot);
   inquiry_.joint_start = nullptr;
-  if (!answered) return false;
-  if (jointly != nullptr) *jointly = joint.report.status != Status::unused;
-  if (joint.report.status == Status::success)
-    *report = joint.report;
-  else if (!corrector_.stopped())
-    point_.project(t0, y, how.hold, variables_.id(), unknowns_.weights, *report);
-  return true;
+  if (!answered && run_.broken) throw NoStart{report_.status, report_.message};
+  if (!answered)
+    throw NoStart{Status::internal_error,
+                  "IDA could not be started at the given values; set tolerances and the linear "
+                  "solver before make_consistent, and look at IDA's own message"};
+  if (corrector_.stopped()) throw NoStart{Status::callback_fatal, corrector_.stop_text()};
+  *jointly = joint.report.status != Status::unused;
+  if (joint.report.status != Status::success)
+    point_.project(t0, y, how.hold, variables_.id(), unknowns_.weights, joint.report);
+  return joint.report;
+}
+
+// Far from consistent algebraic variables, rows that repeat equations of F act as conditions on the
+// other variables. Algebraic variables therefore move first if that moves the others less. Returns
+// the report of that way, if it was taken.
+std::optional<ConsistencyReport> Projection::Impl::move_algebraic_first(double t0, N_Vector start,
+                                                                        N_Vector y, N_Vector ydot,
+                                                                        const Consistency& how) {
+  const N_Vector id = variables_.id();
+  if (id == nullptr || !how.hold.empty() || !options_.hold.empty()) return {};
+  const auto moved = [&](N_Vector to) {
+    OwnedVector way(to);
+    N_VLinearSum(1.0, to, -1.0, start, way);
+    return N_VWrmsNormMask(way, unknowns_.weights, id);
+  };
+  const OwnedVector near = copy_of(start), slope = copy_of(ydot);
+  bool jointly = false;
+  try {
+    find_derivative(t0, near, slope, how);
+    const ConsistencyReport other = project_start(t0, near, slope, how, &jointly);
+    if (!(moved(near) < 0.5 * moved(y))) return {};
+    N_VScale(1.0, near, y);
+    N_VScale(1.0, slope, ydot);
+    return other;
+  } catch (const NoStart&) {
+    return {};
+  }
 }
 
 // Alternates between rows that contain algebraic variables and the equations of F, until neither
 // moves the point. The report has the length of the first projection and the last drift.
-bool Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                                    ConsistencyReport* report) {
+void Projection::Impl::settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                                    ConsistencyReport& report) {
   constexpr int kRounds = 8;
   constexpr double kSettled = 1e-3;  // tolerances
-  OwnedVector before(y);
-  const auto fail = [report](Status why, const std::string& text) {
-    report->status = why;
-    report->message = text;
-    return false;
-  };
+  const double residual_before = report.residual_before;
   for (int round = 0; round < kRounds; ++round) {
-    N_VScale(1.0, y, before);
-    ConsistencyReport again;
+    const OwnedVector before = copy_of(y);
     bool jointly = false;
-    bool begun = project_start(t0, y, ydot, how, &again, round == 0 ? &jointly : nullptr);
-    // Far from consistent algebraic variables, rows that repeat equations of F act as conditions on
-    // the other variables. Algebraic variables therefore move first if that moves the others less.
-    const N_Vector id = variables_.id();
-    if (begun && jointly && id != nullptr && how.hold.empty() && options_.hold.empty()) {
-      const auto moved = [&](N_Vector from, N_Vector to) {
-        OwnedVector way(to);
-        N_VLinearSum(1.0, to, -1.0, from, way);
-        return N_VWrmsNormMask(way, unknowns_.weights, id);
-      };
-      OwnedVector near(y), slope(ydot);
-      N_VScale(1.0, before, near);
-      N_VScale(1.0, ydot, slope);
-      Status ignored = Status::success;
-      ConsistencyReport other;
-      if (find_derivative(t0, near, slope, how, &ignored).empty() &&
-          project_start(t0, near, slope, how, &other, nullptr) &&
-          moved(before, near) < 0.5 * moved(before, y)) {
-        N_VScale(1.0, near, y);
-        N_VScale(1.0, slope, ydot);
-        again = other;
-      }
+    ConsistencyReport again = project_start(t0, y, ydot, how, &jointly);
+    if (round == 0) {
+      report = jointly ? move_algebraic_first(t0, before, y, ydot, how).value_or(again) : again;
+      report.residual_before = residual_before;
+    } else {
+      report.drift_after = again.drift_after;
     }
-    if (!begun) {
-      if (run_.broken) return fail(report_.status, std::string(report_.message));
-      return fail(Status::internal_error,
-                  "IDA could not be started at the given values; set tolerances and the linear "
-                  "solver before make_consistent, and look at IDA's own message");
-    }
-    if (corrector_.stopped())
-      return fail(Status::callback_fatal, std::string(corrector_.stop_text()));
-    if (round == 0)
-      *report = again;
-    else
-      report->drift_after = again.drift_after;
-    if (again.status != Status::success) return fail(again.status, again.message);
+    if (round == 0) again = report;
+    if (corrector_.stopped()) throw NoStart{Status::callback_fatal, corrector_.stop_text()};
+    if (again.status != Status::success) throw NoStart{again.status, again.message};
     N_VLinearSum(1.0, y, -1.0, before, before);
-    if (round > 0 && N_VWrmsNorm(before, unknowns_.weights) <= kSettled) return true;
-    Status failure = Status::success;
-    const std::string reason = find_derivative(t0, y, ydot, how, &failure);
-    if (!reason.empty()) return fail(failure, reason);
-    if (how.derivative == Consistency::Derivative::keep) return true;
+    if (round > 0 && N_VWrmsNorm(before, unknowns_.weights) <= kSettled) return;
+    find_derivative(t0, y, ydot, how);
+    if (how.derivative == Consistency::Derivative::keep) return;
   }
-  return fail(Status::not_converged,
-              "the algebraic variables that F asks for move y off the constraints again and again; "
-              "start closer, or give rows without algebraic variables");
+  throw NoStart{Status::not_converged,
+                "the algebraic variables that F asks for move y off the constraints again and "
+                "again; start closer, or give rows without algebraic variables"};
 }
 
 ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Vector yp,
                                                     const Consistency& how) {
-  ConsistencyReport report;
-  const auto fail = [&](Status why, const std::string& text) {
-    IDAReInit(ida_.mem(), t0, yy, yp);  // as the caller had it
-    report.status = report_.status = why;
-    report.message = report_.message = text;
-    return report;
-  };
   if (yy == nullptr || yp == nullptr) reject("make_consistent: yy and yp must not be null");
   if (!how.hold.empty() && static_cast<int>(how.hold.size()) != unknowns_.count)
     reject("make_consistent: hold has " + std::to_string(how.hold.size()) + " entries for " +
            std::to_string(unknowns_.count) + " unknowns");
-  if (static_cast<int>(how.derivative) < 0 ||
-      static_cast<int>(how.derivative) > static_cast<int>(Consistency::Derivative::keep))
+  if (static_cast<int>(how.derivative) < 0 || how.derivative > Consistency::Derivative::keep)
     reject("make_consistent: derivative = " + std::to_string(static_cast<int>(how.derivative)) +
            "; it must be one of Consistency::Derivative");
-  if (!movers_.used) return report.status = report_.status = Status::success, report;
-
-  int flag = 0;
+  ConsistencyReport report;
+  report.status = Status::success;
+  if (!movers_.used) return report;
   corrector_.forget_stop();
-  OwnedVector y(yy), ydot(yp);
-  N_VScale(1.0, yy, y);
-  N_VScale(1.0, yp, ydot);
-  const double residual_before = largest_residual(how.residual, how.user_data, t0, yy, yp, &flag);
-  if (flag < 0) return fail(Status::callback_fatal, kResidualEnded);
-  const bool settled = settle_start(t0, y, ydot, how, &report);
-  report.residual_before = residual_before;
-  if (!settled) return fail(report.status, std::string(report.message));
-
-  OwnedVector change(yy);
-  N_VLinearSum(1.0, y, -1.0, yy, change);
-  report.move = N_VWrmsNorm(change, unknowns_.weights);
-  if (unknowns_.contiguous) {
-    report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy),
-                                               unknowns_.count, &report.changed_component);
-    report.derivative_change = largest_difference(N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp),
-                                                  unknowns_.count, nullptr);
-  } else if (static_cast<N_Vector>(change)->ops->nvmaxnorm != nullptr) {
-    report.largest_change = N_VMaxNorm(change);
-    N_VLinearSum(1.0, ydot, -1.0, yp, change);
-    report.derivative_change = N_VMaxNorm(change);
+  const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
+  try {
+    report.residual_before = largest_residual(how, t0, yy, yp);
+    settle_start(t0, y, ydot, how, report);
+    note_changes(report, yy, y, yp, ydot);
+    report.residual_after = largest_residual(how, t0, y, ydot);
+  } catch (const NoStart& failure) {
+    IDAReInit(ida_.mem(), t0, yy, yp);  // as the caller had it
+    report.status = failure.status;
+    report.message = failure.text;
+    return report;
   }
-  report.residual_after = largest_residual(how.residual, how.user_data, t0, y, ydot, &flag);
-  if (flag < 0) return fail(Status::callback_fatal, kResidualEnded);
   N_VScale(1.0, y, yy);
   N_VScale(1.0, ydot, yp);
   IDAReInit(ida_.mem(), t0, yy, yp);
   reset_statistics();
-  report_.status = report.status = Status::success;
-  report_.message = report.message;
   return report;
+}
+
+void Projection::Impl::note_changes(ConsistencyReport& report, N_Vector yy, N_Vector y, N_Vector yp,
+                                    N_Vector ydot) const {
+  OwnedVector change(yy);
+  N_VLinearSum(1.0, y, -1.0, yy, change);
+  const int n = unknowns_.contiguous ? unknowns_.count : 0;
+  report.move = N_VWrmsNorm(change, unknowns_.weights);
+  report.largest_change = largest_change(yy, y, n, &report.changed_component);
+  if (yp != nullptr) report.derivative_change = largest_change(yp, ydot, n, nullptr);
 }
 
 ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) {
   if (yy == nullptr) reject("project: yy must not be null");
   ConsistencyReport report;
-  if (!movers_.used) {
-    report.status = report_.status = Status::success;
-    return report;
-  }
+  report.status = Status::success;
+  if (!movers_.used) return report;
   current_weights(yy);
-  OwnedVector y(yy);
-  N_VScale(1.0, yy, y);
+  const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
   point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
-  if (report.status == Status::success && yp != nullptr) {
-    OwnedVector ydot(yp);
-    N_VScale(1.0, yp, ydot);
-    if (point_.tangent(t, y, ydot, report)) {
-      report.derivative_change = largest_difference(
-          N_VGetArrayPointer(ydot), N_VGetArrayPointer(yp), unknowns_.count, nullptr);
-      N_VScale(1.0, ydot, yp);
-    }
-  }
-  if (report.status == Status::success) {
-    OwnedVector change(yy);
-    N_VLinearSum(1.0, y, -1.0, yy, change);
-    report.move = N_VWrmsNorm(change, unknowns_.weights);
-    if (unknowns_.contiguous)
-      report.largest_change = largest_difference(N_VGetArrayPointer(y), N_VGetArrayPointer(yy),
-                                                 unknowns_.count, &report.changed_component);
-    N_VScale(1.0, y, yy);
-  }
-  report_.status = report.status;
-  report_.message = report.message;
+  const bool turned =
+      report.status == Status::success && ydot && point_.tangent(t, y, ydot, report);
+  if (report.status != Status::success) return report;
+  note_changes(report, yy, y, turned ? yp : nullptr, ydot);
+  N_VScale(1.0, y, yy);
+  if (turned) N_VScale(1.0, ydot, yp);
   return report;
 }
 
@@ -305,12 +279,9 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
   // A point at the end of a step is projected already, an interpolated one is not.
   const Status of_step = report_.status;
   const std::string text = report_.message;
-  const InUse here(in_use_);
-  project(*tret, yret, ypret);
-  if (report_.status == Status::success) {
-    report_.status = of_step;
-    report_.message = text;
-  }
+  if (!answer("solve", {}, [&] { return project(*tret, yret, ypret); })) return flag;
+  report_.status = of_step;
+  report_.message = text;
   return flag;
 }
 

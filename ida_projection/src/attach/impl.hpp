@@ -82,11 +82,12 @@ class Projection::Impl {
                            Call call) {
     ConsistencyReport report;
     report.message = why_misused(function, vectors);
+    report.status = Status::misused;
     if (report.message.empty()) {
       const InUse here(in_use_);
-      return call();
+      report = call();
     }
-    report.status = report_.status = Status::misused;
+    report_.status = report.status;
     report_.message = report.message;
     return report;
   }
@@ -178,12 +179,15 @@ class Projection::Impl {
   struct JointStart;
   bool probe(double t0, N_Vector yy, N_Vector yp);
   void project_jointly(const Candidate& candidate);
-  std::string find_derivative(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                              Status* failure);
-  bool project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                     ConsistencyReport* report, bool* jointly);
-  bool settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                    ConsistencyReport* report);
+  void find_derivative(double t0, N_Vector y, N_Vector ydot, const Consistency& how);
+  ConsistencyReport project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                                  bool* jointly);
+  std::optional<ConsistencyReport> move_algebraic_first(double t0, N_Vector start, N_Vector y,
+                                                        N_Vector ydot, const Consistency& how);
+  void settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
+                    ConsistencyReport& report);
+  void note_changes(ConsistencyReport& report, N_Vector yy, N_Vector y, N_Vector yp,
+                    N_Vector ydot) const;
   void current_weights(N_Vector y);
 
   // Movers of the caller's rows alone (null: there are none), and joined with equations of F.

@@ -16,30 +16,6 @@ void reject(const std::string& text) { throw std::invalid_argument("Projection: 
 
 namespace {
 
-const char* missing_operation(N_Vector v) {
-  const N_Vector_Ops ops = v->ops;
-  if (ops->nvclone == nullptr) return "N_VClone";
-  if (ops->nvdestroy == nullptr) return "N_VDestroy";
-  if (ops->nvlinearsum == nullptr) return "N_VLinearSum";
-  if (ops->nvscale == nullptr) return "N_VScale";
-  if (ops->nvconst == nullptr) return "N_VConst";
-  if (ops->nvwrmsnorm == nullptr) return "N_VWrmsNorm";
-  return nullptr;
-}
-
-const char* missing_gradient_operation(N_Vector v) {
-  const N_Vector_Ops ops = v->ops;
-  if (ops->nvprod == nullptr) return "N_VProd";
-  if (ops->nvdotprod == nullptr) return "N_VDotProd";
-  if (ops->nvabs == nullptr) return "N_VAbs";
-  if (ops->nvinv == nullptr) return "N_VInv";
-  if (ops->nvmin == nullptr) return "N_VMin";
-  if (ops->nvmaxnorm == nullptr) return "N_VMaxNorm";
-  if (ops->nvaddconst == nullptr) return "N_VAddConst";
-  if (ops->nvgetlength == nullptr) return "N_VGetLength";
-  return nullptr;
-}
-
 // The pattern of rows given by their entries.
 template <class Rows>
 void check_pattern(const std::string& kind, const Rows& sparse, int rows, long unknowns,
@@ -127,9 +103,8 @@ void check_rows(const Constraints& set, long unknowns, N_Vector like) {
   for (const Constraints& part : set.joined) check_rows(part, unknowns, like);
 }
 
-void require(bool condition, const char* name, double value, const char* right) {
-  if (!condition)
-    reject(std::string("options.") + name + " = " + shortest(value) + "; it must be " + right);
+void require(bool condition, const std::string& name, double value, const std::string& right) {
+  if (!condition) reject("options." + name + " = " + shortest(value) + "; it must be " + right);
 }
 
 }  // namespace
@@ -154,58 +129,53 @@ bool is_contiguous(N_Vector v) {
 #endif
 }
 
-void validate(const Constraints& constraints, const Options& options, N_Vector like) {
-  if (const char* missing = missing_operation(like))
-    reject(std::string("the vector type lacks ") + missing + ", which the projection needs");
-  check_rows(constraints, like->ops->nvgetlength != nullptr ? N_VGetLength(like) : 0, like);
-  if (like->ops->nvgetlength != nullptr) {
-    const std::string refusal = wrong_length(constraints, static_cast<long>(N_VGetLength(like)));
-    if (!refusal.empty()) reject(refusal);
-  }
+namespace {
 
-  const auto check_kind = [](int value, int last, const char* name) {
-    if (value < 0 || value > last)
-      reject(std::string("options.") + name + " = " + std::to_string(value) + "; it must be 0 .. " +
-             std::to_string(last));
+// IDAInit has checked those that IDA uses itself.
+void check_vector_type(const Constraints& constraints, N_Vector like) {
+  if (!has_rows(constraints) || has_values(constraints) ||
+      std::holds_alternative<UserProjection>(constraints.jacobian))
+    return;
+  const N_Vector_Ops ops = like->ops;
+  const char* missing = ops->nvdotprod == nullptr     ? "N_VDotProd"
+                        : ops->nvmaxnorm == nullptr   ? "N_VMaxNorm"
+                        : ops->nvgetlength == nullptr ? "N_VGetLength"
+                                                      : nullptr;
+  if (missing != nullptr)
+    reject(std::string("the vector type lacks ") + missing +
+           ", which constraints given as Gradients or DistributedRows need");
+}
+
+void check_numbers(const Advanced& given) {
+  const auto kind = [](const char* name, auto value, auto last) {
+    require(static_cast<int>(value) >= 0 && value <= last, name, static_cast<int>(value),
+            "0 .. " + std::to_string(static_cast<int>(last)));
   };
-  check_kind(static_cast<int>(options.advanced.metric), static_cast<int>(Metric::automatic),
-             "metric");
-  check_kind(static_cast<int>(options.advanced.long_move), static_cast<int>(LongMove::cap),
-             "long_move");
-  require(options.advanced.tolerance > 0.0, "tolerance", options.advanced.tolerance,
-          "> 0 (tolerances)");
-  check_kind(static_cast<int>(options.advanced.polish), static_cast<int>(Polished::none), "polish");
-  require(options.advanced.maximum_iterations >= 1, "maximum_iterations",
-          options.advanced.maximum_iterations, ">= 1");
+  kind("metric", given.metric, Metric::automatic);
+  kind("long_move", given.long_move, LongMove::cap);
+  require(given.tolerance > 0.0, "tolerance", given.tolerance, "> 0 (tolerances)");
+  kind("polish", given.polish, Polished::none);
+  require(given.maximum_iterations >= 1, "maximum_iterations", given.maximum_iterations, ">= 1");
   require(
-      options.advanced.largest_move >= 0.1, "largest_move", options.advanced.largest_move,
+      given.largest_move >= 0.1, "largest_move", given.largest_move,
       ">= 0.1 (tolerances): the drift of a single good step is as long, and shorter limits make "
       "steps short instead");
-  require(options.advanced.maximum_step >= 0.0, "maximum_step", options.advanced.maximum_step,
-          ">= 0 (0: no limit)");
-  require(options.advanced.maximum_order >= 1 && options.advanced.maximum_order <= 5,
-          "maximum_order", options.advanced.maximum_order, "1 .. 5 (as IDASetMaxOrd)");
-  if (options.nonlinear_solver != nullptr) {
-    const SUNNonlinearSolver_Ops ops = options.nonlinear_solver->ops;
-    if (ops->gettype == nullptr || ops->solve == nullptr || ops->setsysfn == nullptr)
-      reject("options.nonlinear_solver lacks gettype, solve or setsysfn, which IDA needs");
-  }
-  if (options.nonlinear_solver != nullptr &&
-      SUNNonlinSolGetType(options.nonlinear_solver) != SUNNONLINEARSOLVER_ROOTFIND)
+  require(given.maximum_step >= 0.0, "maximum_step", given.maximum_step, ">= 0 (0: no limit)");
+  require(given.maximum_order >= 1 && given.maximum_order <= 5, "maximum_order",
+          given.maximum_order, "1 .. 5 (as IDASetMaxOrd)");
+}
+
+void check_solver(SUNNonlinearSolver solver) {
+  if (solver == nullptr) return;
+  const SUNNonlinearSolver_Ops ops = solver->ops;
+  if (ops->gettype == nullptr || ops->solve == nullptr || ops->setsysfn == nullptr)
+    reject("options.nonlinear_solver lacks gettype, solve or setsysfn, which IDA needs");
+  if (SUNNonlinSolGetType(solver) != SUNNONLINEARSOLVER_ROOTFIND)
     reject("options.nonlinear_solver is not of root-finding type, which IDA needs");
+}
 
-  if (!has_rows(constraints)) return;
-
-  const bool contiguous = is_contiguous(like);
-  const auto length = like->ops->nvgetlength != nullptr ? N_VGetLength(like) : -1;
-  if (has_values(constraints) && !contiguous)
-    reject(
-        "the vectors are not contiguous in this process; give the constraints as Gradients "
-        "or DistributedRows");
-  if (!has_values(constraints) && !std::holds_alternative<UserProjection>(constraints.jacobian))
-    if (const char* missing = missing_gradient_operation(like))
-      reject(std::string("the vector type lacks ") + missing +
-             ", which constraints given as Gradients or DistributedRows need");
+// Options with an entry for each unknown.
+void check_entries(const Options& options, N_Vector like, bool contiguous, sunindextype length) {
   const auto check_size = [&](std::size_t size, const char* name) {
     if (size == 0) return;
     if (!contiguous)
@@ -217,26 +187,42 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
   check_size(options.hold.size(), "hold");
   check_size(options.group.size(), "group");
   for (std::size_t j = 0; j < options.group.size(); ++j)
-    if (options.group[j] < -1)
-      reject("options.group[" + std::to_string(j) + "] = " + std::to_string(options.group[j]) +
-             "; it must be a group >= 0, or -1 for none");
+    require(options.group[j] >= -1, "group[" + std::to_string(j) + "]", options.group[j],
+            "a group >= 0, or -1 for none");
   const auto check_vector = [&](N_Vector v, const char* name) {
-    if (v == nullptr) return;
-    if (N_VGetVectorID(v) != N_VGetVectorID(like) ||
-        (v->ops->nvgetlength != nullptr && N_VGetLength(v) != length))
+    if (v != nullptr && (N_VGetVectorID(v) != N_VGetVectorID(like) ||
+                         (v->ops->nvgetlength != nullptr && N_VGetLength(v) != length)))
       reject(std::string("options.") + name +
              " is of another vector type or length than the unknowns (" + std::to_string(length) +
              ")");
   };
   check_vector(options.id, "id");
   check_vector(options.advanced.hold_vector, "hold_vector");
-  if (options.id != nullptr && contiguous) {
-    const double* id = N_VGetArrayPointer(options.id);
-    for (sunindextype j = 0; j < length; ++j)
-      if (id[j] != 0.0 && id[j] != 1.0)
-        reject("options.id[" + std::to_string(j) + "] = " + shortest(id[j]) +
-               "; it must be 1 (differential) or 0 (algebraic)");
+  for (sunindextype j = 0; options.id != nullptr && contiguous && j < length; ++j) {
+    const double entry = N_VGetArrayPointer(options.id)[j];
+    require(entry == 0.0 || entry == 1.0, "id[" + std::to_string(j) + "]", entry,
+            "1 (differential) or 0 (algebraic)");
   }
+}
+
+}  // namespace
+
+void validate(const Constraints& constraints, const Options& options, N_Vector like) {
+  const bool has_length = like->ops->nvgetlength != nullptr, contiguous = is_contiguous(like);
+  const sunindextype length = has_length ? N_VGetLength(like) : -1;
+  check_vector_type(constraints, like);
+  check_rows(constraints, has_length ? length : 0, like);
+  const std::string refusal =
+      has_length ? wrong_length(constraints, static_cast<long>(length)) : std::string();
+  if (!refusal.empty()) reject(refusal);
+  check_numbers(options.advanced);
+  check_solver(options.nonlinear_solver);
+  if (!has_rows(constraints)) return;
+  if (has_values(constraints) && !contiguous)
+    reject(
+        "the vectors are not contiguous in this process; give the constraints as Gradients "
+        "or DistributedRows");
+  check_entries(options, like, contiguous, length);
 }
 
 }  // namespace tether::ida_projection

@@ -36,4 +36,11 @@ class OwnedVector : public Owned<N_Vector, N_VDestroy> {
   operator N_Vector() const { return get(); }
 };
 
+/// Its entries; null of null.
+inline OwnedVector copy_of(N_Vector v) {
+  OwnedVector copy(v);
+  if (copy) N_VScale(1.0, v, copy);
+  return copy;
+}
+
 }  // namespace tether::ida_projection

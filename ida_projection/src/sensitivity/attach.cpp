@@ -7,15 +7,6 @@
 
 namespace tether::ida_projection {
 
-namespace {
-
-/// C at one point, for gradients across it.
-struct GradientProjection final : Companion {
-  std::unique_ptr<TangentRows> rows;
-};
-
-}  // namespace
-
 void Projection::project_sensitivities(Sensitivities sensitivities,
                                        const tether_idas_functions& idas) {
   impl_->project_sensitivities(std::move(sensitivities), idas);
@@ -59,8 +50,6 @@ ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_V
                (v == nullptr ? "is null" : "is unlike y: " + why_unlike_y(v)));
   current_weights(yy);
   sensitivities.make_consistent(t0, yy, yp, unknowns_.weights, s, sp, report);
-  report_.status = report.status;
-  report_.message = report.message;
   return report;
 }
 
@@ -74,9 +63,9 @@ ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Ve
   if (std::holds_alternative<DistributedRows>(constraints_.jacobian))
     reject("project_gradient: DistributedRows are not taken");
   current_weights(yy);
-  if (!gradient_) gradient_ = std::make_unique<GradientProjection>();
-  std::unique_ptr<TangentRows>& tangent = static_cast<GradientProjection&>(*gradient_).rows;
-  if (!tangent) tangent = make_tangent_rows(constraints_, options_, statistics_, unknowns_.weights);
+  if (!gradient_)
+    gradient_ = make_tangent_rows(constraints_, options_, statistics_, unknowns_.weights);
+  auto* tangent = static_cast<TangentRows*>(gradient_.get());
   OwnedVector unit(yy), across(yy);
   N_VConst(1.0, unit);
   std::vector<double> r(static_cast<std::size_t>(tangent->rows()), 0.0);
@@ -91,8 +80,6 @@ ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Ve
   } else {
     report.message = tangent->message();
   }
-  report_.status = report.status;
-  report_.message = report.message;
   return report;
 }
 

@@ -5,10 +5,9 @@
 #include <memory>
 #include <string>
 #include <sundials/sundials_nvector.h>
-#include <tether/ida_projection/options.hpp>
-#include <tether/ida_projection/projection.hpp>
-#include <tether/ida_projection/statistics.hpp>
 #include <vector>
+
+#include "attach/impl.hpp"
 
 namespace tether::ida_projection {
 
@@ -16,10 +15,8 @@ namespace tether::ida_projection {
 /// move leaves rounding only. Rows that are dependent on the set have dependent derivatives there,
 /// up to an error as large as the distance from the set. Rows whose independent part is below a
 /// thousandth therefore take no part.
-class TangentRows {
+class TangentRows : public Companion {
  public:
-  virtual ~TangentRows() = default;
-
   virtual int rows() const = 0;
   /// g(t, y) itself, for differences in parameters.
   virtual Status value(double t, N_Vector y, double* g) = 0;
