@@ -43,6 +43,8 @@ class Companion {
 
 /// The decorator of IDA's nonlinear solver: puts the parts of a projected step together.
 class Projection::Impl {
+  friend class SensitivityCorrector;  // an add-on, which moves sensitivities as the state
+
  public:
   Impl(void* ida_mem, Constraints constraints, Options options);
   ~Impl();

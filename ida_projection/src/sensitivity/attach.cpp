@@ -26,10 +26,7 @@ void Projection::Impl::project_sensitivities(Sensitivities given,
   if (movers_.used == nullptr) return;  // no constraints
   const std::string misused = why_misused("project_sensitivities", {});
   if (!misused.empty()) reject(misused);
-  sensitivities_ = std::make_unique<SensitivityCorrector>(
-      SensitivityCorrector::State{constraints_, options_, statistics_, report_, ida_, lifetime_,
-                                  variables_, polish_, movers_.joined, movers_.own, run_.engaged},
-      std::move(given), idas, ida_.step().y_predicted, unknowns_.contiguous);
+  sensitivities_ = std::make_unique<SensitivityCorrector>(*this, std::move(given), idas);
 }
 
 ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_Vector yy,

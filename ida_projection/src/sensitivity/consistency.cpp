@@ -21,8 +21,9 @@ double largest(const std::vector<double>& values) {
 void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_Vector weights,
                                            N_Vector* s, N_Vector* sp, ConsistencyReport& report) {
   moved_ = nullptr;
-  const Constraints& rows = state_.constraints;
-  rows_ = make_tangent_rows(rows, state_.options, state_.statistics, s_);
+  message_.clear();
+  const Constraints& rows = state_.constraints_;
+  rows_ = make_tangent_rows(rows, state_.options_, state_.statistics_, s_);
   row_terms_.assign(static_cast<std::size_t>(count()),
                     std::vector<double>(static_cast<std::size_t>(rows_->rows()), 0.0));
   r_ = row_terms_.front();
@@ -31,11 +32,10 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
   // r_ and the factors of C at (t + e, y + e y').
   const auto residual = [&](int k, double e, N_Vector of) {
     N_VLinearSum(1.0, y, e, yp, at);
-    Status status = rows_->evaluate(t + e, at, weights, state_.variables.id());
+    Status status = rows_->evaluate(t + e, at, weights, state_.variables_.id());
     if (status == Status::success) status = rows_->factor(D_);
-    if (status != Status::success) message_ = rows_->message();
     if (status == Status::success) status = derivative(k, t + e, at);
-    if (status == Status::success) status = product(of);
+    if (status == Status::success) status = rows_->product(of, r_.data());
     for (std::size_t i = 0; i < r_.size(); ++i) r_[i] += row_terms_[static_cast<std::size_t>(k)][i];
     return status;
   };
@@ -44,7 +44,7 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
   std::vector<OwnedVector> moved, moved_p;
   const auto fail = [&](Status status) {
     report.status = status;
-    report.message = message_;
+    report.message = message_.empty() ? rows_->message() : message_;
   };
   for (int k = 0; k < count(); ++k) {
     moved.emplace_back(y);
@@ -59,12 +59,11 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
     if ((status = residual(k, 0.0, moved.back())) != Status::success) return fail(status);
     report.drift_after = std::max(report.drift_after, largest(r_));
     if (sp == nullptr) continue;
-    std::vector<double> rate(r_.size(), 0.0);
-    for (const auto& [steps, weight] :
-         {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
-      if ((status = residual(k, steps * e, moved.back())) != Status::success) return fail(status);
-      for (std::size_t i = 0; i < r_.size(); ++i) rate[i] += weight / (12.0 * e) * r_[i];
-    }
+    std::vector<double> rate(r_.size());
+    status = central_differences(e, rate, r_, [&](double step, std::vector<double>&) {
+      return residual(k, step, moved.back());
+    });
+    if (status != Status::success) return fail(status);
     if ((status = residual(k, 0.0, sp[k])) != Status::success) return fail(status);
     for (std::size_t i = 0; i < r_.size(); ++i)
       rate[i] += r_[i] - row_terms_[static_cast<std::size_t>(k)][i];

@@ -32,9 +32,7 @@ class ContiguousTangent final : public TangentRows {
   void forget_failure() override { evaluator_.forget(); }
 
   Status value(double t, N_Vector y, double* g) override {
-    const Status status = evaluator_.value(t, N_VGetArrayPointer(y), size(), g);
-    if (status != Status::success) message_ = evaluator_.message();
-    return status;
+    return told(evaluator_.value(t, N_VGetArrayPointer(y), size(), g));
   }
 
   Status evaluate(double t, N_Vector y, N_Vector weights, N_Vector id) override {
@@ -49,8 +47,7 @@ class ContiguousTangent final : public TangentRows {
       known_ = false;
       status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
     }
-    if (status != Status::success) message_ = evaluator_.message();
-    return status;
+    return told(status);
   }
 
   Status factor(N_Vector D) override {
@@ -93,15 +90,18 @@ class ContiguousTangent final : public TangentRows {
     const double d = kAlong * (largest_y > 0.0 ? largest_y : 1.0) / largest_s;
     shifted_.resize(y_.size());
     g_.resize(static_cast<std::size_t>(rows()));
-    for (const auto& [steps, weight] :
-         {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
-      for (std::size_t j = 0; j < y_.size(); ++j) shifted_[j] = y_[j] + steps * d * s[j];
-      const Status status = evaluator_.value(t_, shifted_.data(), size(), g_.data());
-      if (status != Status::success) message_ = evaluator_.message();
-      if (status != Status::success) return status;
-      for (std::size_t i = 0; i < g_.size(); ++i) r[i] += weight / (12.0 * d) * g_[i];
-    }
-    return Status::success;
+    slope_.resize(g_.size());
+    const Status status = central_differences(d, slope_, g_, [&](double e, auto& g) {
+      for (std::size_t j = 0; j < y_.size(); ++j) shifted_[j] = y_[j] + e * s[j];
+      return told(evaluator_.value(t_, shifted_.data(), size(), g.data()));
+    });
+    std::copy(slope_.begin(), slope_.end(), r);
+    return status;
+  }
+
+  Status told(Status status) {
+    if (status != Status::success) message_ = evaluator_.message();
+    return status;
   }
 
   int size() const { return static_cast<int>(y_.size()); }
@@ -147,7 +147,7 @@ class ContiguousTangent final : public TangentRows {
   Statistics& statistics_;
   Evaluator evaluator_;
   Rows blocks_;
-  std::vector<double> y_, WT_, shifted_, g_;
+  std::vector<double> y_, WT_, shifted_, g_, slope_;
   N_Vector id_ = nullptr;
   bool structured_ = false;
   bool known_ = false;  // which rows are independent

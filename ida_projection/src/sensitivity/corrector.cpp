@@ -10,7 +10,6 @@
 #include "host/operations.hpp"
 #include "host/rounding.hpp"
 #include "host/shortest.hpp"
-#include "sensitivity/wrapped.hpp"
 
 namespace tether::ida_projection {
 
@@ -18,6 +17,42 @@ namespace {
 
 constexpr double kOnTangent = 1e-8;  // tolerances: a shorter move is not made
 constexpr int kFewRows = 64;         // factors for each sensitivity
+
+/// The content of an N_VectorSensWrapper, the Ns vectors that IDAS corrects together. SUNDIALS
+/// declares it in sundials_nvector_senswrapper.h, which Debian does not ship; it is the same from
+/// 5.8 to 7.5. See why_not_wrapped().
+struct WrappedVectors {
+  N_Vector* vectors;
+  int count;
+#if SUNDIALS_VERSION_MAJOR >= 7
+  sunbooleantype owns;
+#else
+  booleantype owns;
+#endif
+};
+
+N_Vector* vectors_of(N_Vector wrapper) {
+  return static_cast<WrappedVectors*>(wrapper->content)->vectors;
+}
+
+/// Empty, or why `wrapper` is not what IDAS' prediction of `count` sensitivities looks like.
+/// `expected`: its vectors, from IDAS' own getter.
+std::string why_not_wrapped(N_Vector wrapper, N_Vector* expected, int count) {
+  const auto* content = static_cast<const WrappedVectors*>(wrapper->content);
+  if (content == nullptr || expected == nullptr) return "IDAS has no sensitivities";
+  // A type of its own in the newest versions, custom in others; never one of whole vectors.
+  if (wrapper->ops->nvgetarraypointer != nullptr) {
+    // The table of operations of the vectors inside is copied in part only: without data access.
+    return "this SUNDIALS stores sensitivities in another way than versions 5.8 to 7.5";
+  }
+  if (content->count != count)
+    return "Sensitivities::count = " + std::to_string(count) + ", but IDASensInit was given " +
+           std::to_string(content->count);
+  for (int k = 0; k < count; ++k)
+    if (content->vectors == nullptr || content->vectors[k] != expected[k])
+      return "this SUNDIALS stores sensitivities in another way than versions 5.8 to 7.5";
+  return "";
+}
 
 [[noreturn]] void refuse(const std::string& text) {
   throw std::invalid_argument("project_sensitivities: " + text);
@@ -57,32 +92,27 @@ void check(const Sensitivities& given, const Constraints& constraints) {
 
 }  // namespace
 
-SensitivityCorrector::SensitivityCorrector(const State& state, Sensitivities given,
-                                           const tether_idas_functions& idas, N_Vector like,
-                                           bool contiguous)
-    : state_(state), idas_(idas), g_p_(std::move(given)), contiguous_(contiguous) {
-  check(g_p_.given(), state_.constraints);
+SensitivityCorrector::SensitivityCorrector(Projection::Impl& state, Sensitivities given,
+                                           const tether_idas_functions& idas)
+    : state_(state), idas_(idas), given_(std::move(given)) {
+  check(given_, state_.constraints_);
   if (idas_.set_solver == nullptr || idas_.system_data == nullptr || idas_.setups == nullptr)
     refuse("the functions of IDAS are null; call it through project_sensitivities()");
-  SUNNonlinearSolver inner = g_p_.given().nonlinear_solver;
+  N_Vector like = state_.unknowns_.weights;
+  SUNNonlinearSolver inner = given_.nonlinear_solver;
   if (inner == nullptr) {
     own_.reset(SUNNonlinSol_NewtonSens(count(), like, like->sunctx));
     inner = own_.get();
     if (inner == nullptr) throw std::bad_alloc();
   }
   corrector_ = std::make_unique<Corrector>(inner, like);
-  D_ = OwnedVector(like);
-  weights_ = OwnedVector(like);
-  s_ = OwnedVector(like);
-  work_ = OwnedVector(like);
-  spare_ = OwnedVector(like);
+  for (OwnedVector* each : {&D_, &weights_, &s_, &work_, &spare_}) *each = OwnedVector(like);
   for (int k = 0; k < count(); ++k) ds_.emplace_back(like);
-  if (like->ops->nvabs != nullptr && like->ops->nvprod != nullptr && like->ops->nvinv != nullptr &&
-      state_.constraints.total_count() <= kFewRows)
-    for (int k = 0; k < count(); ++k) metrics_.emplace_back(state_.options, like);
+  if (state_.constraints_.total_count() <= kFewRows)
+    for (int k = 0; k < count(); ++k) metrics_.emplace_back(state_.options_, like);
   solver_.reset(Operations<SensitivityCorrector>::make(*this, inner, like->sunctx));
   if (!solver_) throw std::bad_alloc();
-  const int flag = idas_.set_solver(state_.ida.mem(), solver_.get());
+  const int flag = idas_.set_solver(state_.ida_.mem(), solver_.get());
   if (flag != 0)
     refuse("IDASetNonlinearSolverSensStg returned " + std::to_string(flag) +
            "; call IDASensInit with IDA_STAGGERED before. IDA_SIMULTANEOUS corrects states and "
@@ -91,8 +121,8 @@ SensitivityCorrector::SensitivityCorrector(const State& state, Sensitivities giv
 }
 
 SensitivityCorrector::~SensitivityCorrector() {
-  Operations<SensitivityCorrector>::end(solver_.get(), state_.options.print);
-  state_.lifetime.free_at_end(solver_.release());
+  Operations<SensitivityCorrector>::end(solver_.get(), state_.options_.print);
+  state_.lifetime_.free_at_end(solver_.release());
 }
 
 void SensitivityCorrector::forget_run() {
@@ -108,7 +138,7 @@ void SensitivityCorrector::forget_run() {
 
 // Whether an attempt was accepted shows in IDA's count of steps at the next one.
 void SensitivityCorrector::accept() {
-  const long steps = state_.ida.steps();
+  const long steps = state_.ida_.steps();
   if (steps == steps_ + 1)
     for (VectorMetric& metric : metrics_) metric.accept();
   steps_ = steps;
@@ -120,33 +150,34 @@ std::string SensitivityCorrector::set_up(N_Vector predicted) {
   sunrealtype t, cj;
   N_Vector *s = nullptr, *sp, *sn, *spn;
   void* data;
-  idas_.system_data(state_.ida.mem(), &t, &s, &sp, &sn, &spn, &cj, &data);
+  idas_.system_data(state_.ida_.mem(), &t, &s, &sp, &sn, &spn, &cj, &data);
   const std::string reason = why_not_wrapped(predicted, s, count());
   if (!reason.empty()) return reason;
   variables_ = std::make_unique<AlgebraicVariables>(uncounted_);
-  polish_ = std::make_unique<Polish>(state_.options, uncounted_, *corrector_, *variables_);
+  polish_ = std::make_unique<Polish>(state_.options_, uncounted_, *corrector_, *variables_);
   polish_->allocate(predicted, false);
   checked_ = true;
   return "";
 }
 
-int SensitivityCorrector::finish(Status status, const std::string& text) {
+int SensitivityCorrector::finish(Status status) {
   // The state's outcome stands unless this one is worse.
   if (status == Status::success) return 0;
-  return state_.report.finish(status, text, state_.ida.steps());
+  const std::string& text = message_.empty() ? rows_->message() : message_;
+  return state_.report_.finish(status, text, state_.ida_.steps());
 }
 
 int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vector weights,
                                 double tolerance, bool call_setup, void* mem) {
-  const std::string reason = set_up(predicted);
-  if (!reason.empty()) return finish(Status::internal_error, reason);
+  message_ = set_up(predicted);
+  if (!message_.empty()) return finish(Status::internal_error);
   restore_weights(weights);
   polish_->begin();
   corrector_->begin(mem);
   static const std::vector<int> none;
   const Candidate candidate{0.0, predicted, correction, weights};
   int flag = corrector_->correct(candidate, tolerance, call_setup, none);
-  const StepData step = state_.ida.step();
+  const StepData step = state_.ida_.step();
   note_setups(step.cj);
   if (flag != 0) return flag;
 
@@ -166,44 +197,45 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
     status = move_and_polish(candidate, step, tolerance, fix);
   }
   if (corrector_->stopped()) return corrector_->stop_flag();
-  flag = finish(status, message_);
+  flag = finish(status);
   if (flag == 0) leave_out_of_error_test(weights);
   return flag;
 }
 
 // Leaves out derivatives of coupled algebraic variables, for which the state has a wider tolerance.
 void SensitivityCorrector::leave_out_of_error_test(N_Vector weights) {
-  saved_steps_ = state_.ida.steps();
+  saved_steps_ = state_.ida_.steps();
   saved_weights_.clear();
   for (int k = 0; k < count(); ++k)
-    for (const int j : state_.variables.coupled())
+    for (const int j : state_.variables_.coupled())
       saved_weights_.push_back(std::exchange(N_VGetArrayPointer(vectors_of(weights)[k])[j], 0.0));
 }
 
 // IDAS computes them anew for a new step only.
 void SensitivityCorrector::restore_weights(N_Vector weights) {
   std::size_t i = 0;
-  const bool same = state_.ida.steps() == saved_steps_;
+  const bool same = state_.ida_.steps() == saved_steps_;
   for (int k = 0; same && k < count(); ++k)
-    for (const int j : state_.variables.coupled())
+    for (const int j : state_.variables_.coupled())
       if (i < saved_weights_.size())
         N_VGetArrayPointer(vectors_of(weights)[k])[j] = saved_weights_[i++];
 }
 
 // The rows, the variables and the metric that move the state.
 void SensitivityCorrector::use_rows_of_state() {
-  const Constraints* rows =
-      state_.joined.mover() != nullptr ? &state_.joined.constraints() : &state_.constraints;
+  const Constraints* rows = state_.movers_.joined.mover() != nullptr
+                                ? &state_.movers_.joined.constraints()
+                                : &state_.constraints_;
   if (moved_ != rows || !rows_) {
     moved_ = rows;
-    rows_ = make_tangent_rows(*rows, state_.options, state_.statistics, s_);
+    rows_ = make_tangent_rows(*rows, state_.options_, state_.statistics_, s_);
     const auto m = static_cast<std::size_t>(rows_->rows());
     r_.assign(m, 0.0);
     row_terms_.assign(static_cast<std::size_t>(count()), r_);
   }
-  if (!variables_->any() && state_.variables.any()) {
+  if (!variables_->any() && state_.variables_.any()) {
     id_ = OwnedVector(polish_->delta());
-    for (int k = 0; k < count(); ++k) N_VScale(1.0, state_.variables.id(), vectors_of(id_)[k]);
+    for (int k = 0; k < count(); ++k) N_VScale(1.0, state_.variables_.id(), vectors_of(id_)[k]);
     variables_->set(id_);
   }
 }
@@ -211,24 +243,24 @@ void SensitivityCorrector::use_rows_of_state() {
 // IDAS may make new factors for sensitivities, too; both iterations divide by what they belong to.
 void SensitivityCorrector::note_setups(double cj) {
   long setups = 0;
-  idas_.setups(state_.ida.mem(), &setups);
-  if (setups != setups_) state_.polish.note_setup(cj);
+  idas_.setups(state_.ida_.mem(), &setups);
+  if (setups != setups_) state_.polish_.note_setup(cj);
   setups_ = setups;
-  polish_->follow(state_.polish);
+  polish_->follow(state_.polish_);
 }
 
 // C at the accepted candidate, and its factors where one metric serves all.
 Status SensitivityCorrector::evaluate(const StepData& step) {
   y_ = step.y;
-  IDAGetErrWeights(state_.ida.mem(), weights_);
-  N_Vector id = state_.engaged ? state_.joined.moved_id() : nullptr;
+  IDAGetErrWeights(state_.ida_.mem(), weights_);
+  N_Vector id = state_.run_.engaged ? state_.movers_.joined.moved_id() : nullptr;
   Status status = rows_->evaluate(step.t, y_, weights_, id);
   if (status == Status::success && metrics_.empty()) {
-    Mover* mover = state_.joined.mover() != nullptr ? state_.joined.mover() : state_.own.get();
+    Mover* mover = state_.movers_.joined.mover() != nullptr ? state_.movers_.joined.mover()
+                                                            : state_.movers_.own.get();
     if (!mover->rows().metric(D_)) N_VInv(weights_, D_);
     status = rows_->factor(D_);
   }
-  if (status != Status::success) message_ = rows_->message();
   return status;
 }
 
@@ -242,35 +274,14 @@ Status SensitivityCorrector::factor(const Candidate& candidate, int k, bool firs
     metric.update_scale(own, work_, spare_);
     metric.set(own, spare_);
   }
-  const Status status = rows_->factor(metric.D());
-  if (status != Status::success) message_ = rows_->message();
-  return status;
-}
-
-// dg/dp_k for the rows of the caller.
-Status SensitivityCorrector::derivative(int k, double t, N_Vector y) {
-  std::vector<double>& terms = row_terms_[static_cast<std::size_t>(k)];
-  const auto own = static_cast<std::size_t>(state_.constraints.total_count());
-  const Status status = g_p_.evaluate(
-      t, y, k, own, [this](double at, N_Vector v, double* g) { return rows_->value(at, v, g); },
-      terms);
-  if (status != Status::success)
-    message_ = g_p_.message().empty() ? rows_->message() : g_p_.message();
-  return status;
+  return rows_->factor(metric.D());
 }
 
 // Equations of F among the rows are solved by Newton's iteration already: r_ = 0 for them.
 void SensitivityCorrector::add_terms(int k) {
   const std::vector<double>& terms = row_terms_[static_cast<std::size_t>(k)];
-  const auto own = static_cast<std::size_t>(state_.constraints.total_count());
+  const auto own = static_cast<std::size_t>(state_.constraints_.total_count());
   for (std::size_t i = 0; i < r_.size(); ++i) r_[i] = i < own ? r_[i] + terms[i] : 0.0;
-}
-
-// r_ = C s.
-Status SensitivityCorrector::product(N_Vector s) {
-  const Status status = rows_->product(s, r_.data());
-  if (status != Status::success) message_ = rows_->message();
-  return status;
 }
 
 // ds_k for the candidate; `longest`: in tolerances of s_k. The second move has the rows of the
@@ -286,7 +297,7 @@ Status SensitivityCorrector::find_moves(const Candidate& candidate, double t, bo
       if (known != Status::success) return known;
     }
     Status status = factor(candidate, k, first);
-    if (status == Status::success) status = product(s_);
+    if (status == Status::success) status = rows_->product(s_, r_.data());
     if (status != Status::success) return status;
     add_terms(k);
     rows_->solve(r_, ds_[i]);
@@ -304,7 +315,7 @@ Status SensitivityCorrector::find_moves(const Candidate& candidate, double t, bo
 Status SensitivityCorrector::too_long(const Candidate& candidate, int k, double length) {
   const double change =
       N_VWrmsNorm(vectors_of(candidate.correction)[k], vectors_of(candidate.weights)[k]);
-  const double limit = state_.options.advanced.largest_move * std::max(1.0, change);
+  const double limit = state_.options_.advanced.largest_move * std::max(1.0, change);
   if (length <= limit) return Status::success;
   message_ = "the move of sensitivity " + std::to_string(k) + " onto C s + dg/dp = 0 is " +
              brief(length) + " tolerances long, the limit is " + brief(limit) +
@@ -323,14 +334,14 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
                                              double tolerance, Fix& fix) {
   double length = 0.0;
   Status status = find_moves(candidate, step.t, true, &length);
-  if (moved_ != &state_.constraints) state_.joined.restore_ida();
+  if (moved_ != &state_.constraints_) state_.movers_.joined.restore_ida();
   if (status != Status::success) return status;
   if (!engaged_) {
     const double floor = 4.0 * kEpsilon * N_VWrmsNorm(candidate.base, candidate.weights);
     if (length <= std::max(kOnTangent, floor)) return Status::success;
     engaged_ = true;
   }
-  if (length > state_.options.advanced.largest_move)
+  if (length > state_.options_.advanced.largest_move)
     for (int k = 0; k < count(); ++k) {
       N_Vector w = vectors_of(candidate.weights)[k];
       status = too_long(candidate, k, N_VWrmsNorm(ds_[static_cast<std::size_t>(k)], w));
@@ -338,7 +349,7 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
     }
   polish_->keep(candidate);
   apply(candidate);
-  ++state_.statistics.sensitivity_projections;
+  ++state_.statistics_.sensitivity_projections;
   if (!polish_->wanted(length, false)) return Status::success;
   fix = polish_->add_newton_step(candidate, step.cj, tolerance);
   if (!fix.made) return Status::success;

@@ -9,18 +9,8 @@
 #include <vector>
 
 #include "attach/impl.hpp"
-#include "host/corrector.hpp"
-#include "host/ida.hpp"
-#include "host/ida_lifetime.hpp"
-#include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
 #include "movers/vector/vector_metric.hpp"
-#include "sensitivity/parameter_derivative.hpp"
 #include "sensitivity/tangent_rows.hpp"
-#include "start/algebraic.hpp"
-#include "start/joined_rows.hpp"
-#include "step/polish.hpp"
-#include "watch/report.hpp"
 
 namespace tether::ida_projection {
 
@@ -33,31 +23,16 @@ namespace tether::ida_projection {
 /// of its corrections, which makes its errors smaller than the metric of the state does.
 class SensitivityCorrector final : public Companion {
  public:
-  /// The half of the plugin that moves the state.
-  struct State {
-    const Constraints& constraints;
-    const Options& options;
-    Statistics& statistics;
-    Report& report;
-    Ida& ida;
-    const IdaLifetime& lifetime;
-    AlgebraicVariables& variables;
-    Polish& polish;
-    JoinedRows& joined;
-    std::unique_ptr<Mover>& own;
-    bool& engaged;
-  };
-
-  /// `like`: a vector of the state. Throws std::invalid_argument.
-  SensitivityCorrector(const State& state, Sensitivities given, const tether_idas_functions& idas,
-                       N_Vector like, bool contiguous);
+  /// `state`: the half of the plugin that moves the state. Throws std::invalid_argument.
+  SensitivityCorrector(Projection::Impl& state, Sensitivities given,
+                       const tether_idas_functions& idas);
   ~SensitivityCorrector() override;
   SensitivityCorrector(const SensitivityCorrector&) = delete;
   SensitivityCorrector& operator=(const SensitivityCorrector&) = delete;
 
   /// A new run of the state begins.
   void forget_run() override;
-  int count() const { return g_p_.given().count; }
+  int count() const { return given_.count; }
   /// Onto the rows at (t, y), then sp; consistency.cpp.
   void make_consistent(double t, N_Vector y, N_Vector yp, N_Vector weights, N_Vector* s,
                        N_Vector* sp, ConsistencyReport& report);
@@ -69,7 +44,7 @@ class SensitivityCorrector final : public Companion {
   Corrector& corrector() { return *corrector_; }
   long iterations_after_correction() const { return polish_ ? polish_->iterations() : 0; }
   int caught(Status outcome, const char* text) noexcept {
-    return state_.report.caught(outcome, text);
+    return state_.report_.caught(outcome, text);
   }
 
  private:
@@ -84,17 +59,16 @@ class SensitivityCorrector final : public Companion {
   Status find_moves(const Candidate& candidate, double t, bool first, double* longest);
   Status too_long(const Candidate& candidate, int k, double length);
   void apply(const Candidate& candidate);
-  Status product(N_Vector s);
   Status derivative(int k, double t, N_Vector y);
+  Status differences(int parameter, double t, N_Vector y, std::vector<double>& g_p);
   void add_terms(int k);
   void leave_out_of_error_test(N_Vector weights);
   void restore_weights(N_Vector weights);
-  int finish(Status status, const std::string& text);
+  int finish(Status status);
 
-  State state_;
+  Projection::Impl& state_;
   tether_idas_functions idas_;
-  ParameterDerivative g_p_;
-  bool contiguous_;
+  Sensitivities given_;
   Owned<SUNNonlinearSolver, SUNNonlinSolFree> own_;
   std::unique_ptr<Corrector> corrector_;
   Owned<SUNNonlinearSolver, SUNNonlinSolFreeEmpty> solver_;  // IDAS sees it
@@ -106,8 +80,8 @@ class SensitivityCorrector final : public Companion {
   std::vector<VectorMetric> metrics_;           // of each parameter; empty: the state's for all
   std::vector<OwnedVector> ds_;                 // of each parameter
   std::vector<std::vector<double>> row_terms_;  // dg/dp_k
-  std::vector<double> r_;
-  std::string message_;
+  std::vector<double> r_, shifted_;
+  std::string message_;  // of a failure that is not in rows_
 
   // In the shape of IDAS' wrapped vectors, made in the first solve.
   Statistics uncounted_;

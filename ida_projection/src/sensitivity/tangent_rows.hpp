@@ -2,14 +2,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <sundials/sundials_nvector.h>
+#include <utility>
 #include <vector>
 
 #include "attach/impl.hpp"
 
 namespace tether::ida_projection {
+
+/// slope <- d values / de at e = 0, of fourth order: at(e, values) evaluates them four times.
+template <class At>
+Status central_differences(double e, std::vector<double>& slope, std::vector<double>& values,
+                           At at) {
+  std::fill(slope.begin(), slope.end(), 0.0);
+  for (const auto& [steps, weight] :
+       {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
+    const Status status = at(steps * e, values);
+    if (status != Status::success) return status;
+    for (std::size_t i = 0; i < slope.size(); ++i) slope[i] += weight / (12.0 * e) * values[i];
+  }
+  return Status::success;
+}
 
 /// C at one state, and the shortest ds with C ds = r there. The rows are linear in s, so that one
 /// move leaves rounding only. Rows that are dependent on the set have dependent derivatives there,

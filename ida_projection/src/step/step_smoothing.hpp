@@ -69,7 +69,7 @@ class StepSmoother {
   void hold();
   double request(double ratio, double h, bool grows, double norm);
   double reduce_by_weights(double ratio, double h, double norm);
-  // What IDA is told; its defaults but for the bounds of steps that keep their size.
+  // The settings of IDA, by default its own.
   struct Settings {
     double lowest_fixed = 1.0, highest_fixed = 2.0;  // IDASetEtaFixedStepBounds
     double largest = kLargest;
