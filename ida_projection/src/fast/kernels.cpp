@@ -50,100 +50,70 @@ template <int Length>
 struct Kernels {
   static sunindextype length(N_Vector v) { return Length > 0 ? Length : content(v)->length; }
 
-  static void linear_sum(sunrealtype a, N_Vector X, sunrealtype b, N_Vector Y, N_Vector Z) {
-    const sunindextype n = length(Z);
-    const double *x = data(X), *y = data(Y);
-    double* z = data(Z);
-    if (b == 1.0) {
-      TETHER_ELEMENTWISE
-      for (sunindextype i = 0; i < n; ++i) z[i] = a * x[i] + y[i];
-    } else if (a == 1.0) {
-      TETHER_ELEMENTWISE
-      for (sunindextype i = 0; i < n; ++i) z[i] = x[i] + b * y[i];
-    } else if (a == b && a != -1.0) {
-      TETHER_ELEMENTWISE
-      for (sunindextype i = 0; i < n; ++i) z[i] = a * (x[i] + y[i]);
-    } else if (a == -b) {
-      TETHER_ELEMENTWISE
-      for (sunindextype i = 0; i < n; ++i) z[i] = a * (x[i] - y[i]);
-    } else {
-      TETHER_ELEMENTWISE
-      for (sunindextype i = 0; i < n; ++i) z[i] = a * x[i] + b * y[i];
-    }
-  }
-
-  static void constant(sunrealtype c, N_Vector Z) {
-    const sunindextype n = length(Z);
-    double* z = data(Z);
-    for (sunindextype i = 0; i < n; ++i) z[i] = c;
-  }
-
-  static void scale(sunrealtype c, N_Vector X, N_Vector Z) {
-    const sunindextype n = length(Z);
-    const double* x = data(X);
-    double* z = data(Z);
-    TETHER_ELEMENTWISE
-    for (sunindextype i = 0; i < n; ++i) z[i] = c * x[i];
-  }
-
   template <class Function>
-  static void each(N_Vector X, N_Vector Z, Function f) {
+  static void each(N_Vector Z, Function f) {
     const sunindextype n = length(Z);
-    const double* x = data(X);
     double* z = data(Z);
     TETHER_ELEMENTWISE
-    for (sunindextype i = 0; i < n; ++i) z[i] = f(x[i]);
+    for (sunindextype i = 0; i < n; ++i) z[i] = f(i);
+  }
+  template <class Function>
+  static double sum(N_Vector X, Function f) {
+    const sunindextype n = length(X);
+    double total = 0.0;
+    for (sunindextype i = 0; i < n; ++i) total += f(i);
+    return total;
+  }
+
+  static void linear_sum(sunrealtype a, N_Vector X, sunrealtype b, N_Vector Y, N_Vector Z) {
+    const double *x = data(X), *y = data(Y);
+    if (b == 1.0)
+      each(Z, [=](auto i) { return a * x[i] + y[i]; });
+    else if (a == 1.0)
+      each(Z, [=](auto i) { return x[i] + b * y[i]; });
+    else if (a == b && a != -1.0)
+      each(Z, [=](auto i) { return a * (x[i] + y[i]); });
+    else if (a == -b)
+      each(Z, [=](auto i) { return a * (x[i] - y[i]); });
+    else
+      each(Z, [=](auto i) { return a * x[i] + b * y[i]; });
+  }
+  static void constant(sunrealtype c, N_Vector Z) {
+    each(Z, [=](auto) { return c; });
+  }
+  static void scale(sunrealtype c, N_Vector X, N_Vector Z) {
+    each(Z, [=, x = data(X)](auto i) { return c * x[i]; });
   }
   static void absolute(N_Vector X, N_Vector Z) {
-    each(X, Z, [](double x) { return std::abs(x); });
+    each(Z, [x = data(X)](auto i) { return std::abs(x[i]); });
   }
   static void inverse(N_Vector X, N_Vector Z) {
-    each(X, Z, [](double x) { return 1.0 / x; });
+    each(Z, [x = data(X)](auto i) { return 1.0 / x[i]; });
   }
   static void add_constant(N_Vector X, sunrealtype b, N_Vector Z) {
-    each(X, Z, [b](double x) { return x + b; });
+    each(Z, [=, x = data(X)](auto i) { return x[i] + b; });
   }
-
   static void product(N_Vector X, N_Vector Y, N_Vector Z) {
-    const sunindextype n = length(Z);
-    const double *x = data(X), *y = data(Y);
-    double* z = data(Z);
-    TETHER_ELEMENTWISE
-    for (sunindextype i = 0; i < n; ++i) z[i] = x[i] * y[i];
+    each(Z, [x = data(X), y = data(Y)](auto i) { return x[i] * y[i]; });
   }
   static void quotient(N_Vector X, N_Vector Y, N_Vector Z) {
-    const sunindextype n = length(Z);
-    const double *x = data(X), *y = data(Y);
-    double* z = data(Z);
-    TETHER_ELEMENTWISE
-    for (sunindextype i = 0; i < n; ++i) z[i] = x[i] / y[i];
+    each(Z, [x = data(X), y = data(Y)](auto i) { return x[i] / y[i]; });
   }
 
   static sunrealtype dot(N_Vector X, N_Vector Y) {
-    const sunindextype n = length(X);
-    const double *x = data(X), *y = data(Y);
-    double sum = 0.0;
-    for (sunindextype i = 0; i < n; ++i) sum += x[i] * y[i];
-    return sum;
+    return sum(X, [x = data(X), y = data(Y)](auto i) { return x[i] * y[i]; });
   }
-
   static sunrealtype minimum(N_Vector X) {
-    const sunindextype n = length(X);
     const double* x = data(X);
     double least = x[0];
-    for (sunindextype i = 1; i < n; ++i) least = x[i] < least ? x[i] : least;
+    for (sunindextype i = 1; i < length(X); ++i) least = x[i] < least ? x[i] : least;
     return least;
   }
-
   static double square_sum(N_Vector X, N_Vector W) {
-    const sunindextype n = length(X);
-    const double *x = data(X), *w = data(W);
-    double sum = 0.0;
-    for (sunindextype i = 0; i < n; ++i) {
+    return sum(X, [x = data(X), w = data(W)](auto i) {
       const double share = x[i] * w[i];
-      sum += share * share;
-    }
-    return sum;
+      return share * share;
+    });
   }
   static sunrealtype wrms_norm(N_Vector X, N_Vector W) {
     return root(square_sum(X, W) / static_cast<double>(length(X)));
@@ -152,14 +122,11 @@ struct Kernels {
 
   // Masked elements add 0, which changes no sum of squares.
   static sunrealtype wrms_norm_mask(N_Vector X, N_Vector W, N_Vector Mask) {
-    const sunindextype n = length(X);
-    const double *x = data(X), *w = data(W), *mask = data(Mask);
-    double sum = 0.0;
-    for (sunindextype i = 0; i < n; ++i) {
+    const double squares = sum(X, [x = data(X), w = data(W), mask = data(Mask)](auto i) {
       const double share = x[i] * w[i], square = share * share;
-      sum += mask[i] > 0.0 ? square : 0.0;
-    }
-    return root(sum / static_cast<double>(n));
+      return mask[i] > 0.0 ? square : 0.0;
+    });
+    return root(squares / static_cast<double>(length(X)));
   }
 
   // SUNRsqrt: 0 for what is negative; what is no number stays none.
