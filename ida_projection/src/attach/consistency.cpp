@@ -45,39 +45,43 @@ double largest_change(N_Vector from, N_Vector to, int n, int* where) {
 
 }  // namespace
 
-// A start at which rows contain algebraic variables that F determines.
-struct Projection::Impl::JointStart {
+// What the decorated solver is to find out in a step of IDA that goes nowhere.
+struct Projection::Impl::Inquiry {
   double t = 0.0;
-  N_Vector y = nullptr;  // moved on success
+  N_Vector y = nullptr;  // moved on success, where rows contain algebraic variables of F
   const std::vector<bool>& hold;
-  ConsistencyReport report;
+  ConsistencyReport report;  // of that move
+  bool answered = false;
 };
 
-// Solves such rows together with the equations of F, while IDA's residual callback is available.
-void Projection::Impl::project_jointly(const Candidate& candidate) {
-  if (inquiry_.joint_start == nullptr) return;
+// Error weights, algebraic variables, and the move by rows that are solved together with equations
+// of F, while IDA's residual callback is available.
+int Projection::Impl::answer_inquiry(Candidate& candidate) {
+  N_VScale(1.0, candidate.weights, unknowns_.weights);
+  if (!variables_.known()) derive_id(candidate);
+  candidate.t = ida_.step().t;
   movers_.joined.join(candidate, ida_.step().cj);
   if (movers_.joined.mover() != nullptr) {
     PointProjection point(movers_.joined.constraints(), options_);
-    point.project(inquiry_.joint_start->t, inquiry_.joint_start->y, inquiry_.joint_start->hold,
-                  movers_.joined.moved_id(), unknowns_.weights, inquiry_.joint_start->report);
+    point.project(inquiry_->t, inquiry_->y, inquiry_->hold, movers_.joined.moved_id(),
+                  unknowns_.weights, inquiry_->report);
   }
   movers_.joined.forget();
+  inquiry_->answered = true;
+  return 0;
 }
 
-// Lets IDA attempt a step in which the decorated solver returns no correction. It records the error
-// weights and the algebraic variables meanwhile. IDA must be reinitialised afterwards.
-bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
+// Lets IDA attempt a step in which the decorated solver answers the inquiry and returns no
+// correction. IDA must be reinitialised afterwards.
+void Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp, Inquiry& inquiry) {
   const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
   const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
-  bool answered = false;
   const auto answers = [&](double tout) {
     sunrealtype reached = t0;
-    inquiry_.probe = Probe::asked;
     const int flag = IDASolve(ida_.mem(), tout, &reached, y, ydot, IDA_ONE_STEP);
-    answered = std::exchange(inquiry_.probe, Probe::none) == Probe::answered;
-    return answered || flag != IDA_ILL_INPUT;
+    return inquiry.answered || flag != IDA_ILL_INPUT;
   };
+  inquiry_ = &inquiry;
   // IDA refuses a step beyond a stop time, which may lie on one side of t0 or at t0.
   if (!answers(t0 + tiny) && !answers(t0 - tiny)) {
     IDASetStopTime(ida_.mem(), t0 + 2.0 * tiny);
@@ -85,7 +89,7 @@ bool Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp) {
     IDAReInit(ida_.mem(), t0, yy, yp);
     IDASetStopTime(ida_.mem(), t0);
   }
-  return answered;
+  inquiry_ = nullptr;
 }
 
 // Makes y' and the algebraic variables consistent with F.
@@ -120,10 +124,9 @@ void Projection::Impl::find_derivative(double t0, N_Vector y, N_Vector ydot,
 // rows that were solved together with equations of F.
 ConsistencyReport Projection::Impl::project_start(double t0, N_Vector y, N_Vector ydot,
                                                   const Consistency& how, bool* jointly) {
-  JointStart joint{t0, y, how.hold, {}};
-  inquiry_.joint_start = &joint;
-  const bool answered = IDAReInit(ida_.mem(), t0, y, ydot) == 0 && probe(t0, y, ydot);
-  inquiry_.joint_start = nullptr;
+  Inquiry joint{t0, y, how.hold, {}, false};
+  if (IDAReInit(ida_.mem(), t0, y, ydot) == 0) probe(t0, y, ydot, joint);
+  const bool answered = joint.answered && !run_.broken;
   if (!answered && run_.broken) throw NoStart{report_.status, report_.message};
   if (!answered)
     throw NoStart{Status::internal_error,

@@ -81,24 +81,14 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   corrector_.begin(mem);
   if (movers_.used != nullptr) movers_.used->rows().forget_failure();
   control_.restore_weights(weights, attempts_.steps);
-  const bool asked = inquiry_.probe != Probe::none;
-  int flag = asked ? probe_candidate(candidate) : step(candidate, tolerance, call_setup);
+  const bool asked = inquiry_ != nullptr;
+  int flag = asked ? answer_inquiry(candidate) : step(candidate, tolerance, call_setup);
   if (flag == 0 && !asked) choose_step(candidate);
   // A failed evaluation of the plugin's own does no harm, but a fatal flag ends the run.
   const bool ended =
       corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().fatal());
   if (flag >= 0 && ended) flag = finish(Status::callback_fatal, movers_.used->message());
   return corrector_.stopped() ? corrector_.stop_flag() : flag;
-}
-
-// Records the candidate for make_consistent and returns no correction.
-int Projection::Impl::probe_candidate(Candidate& candidate) {
-  N_VScale(1.0, candidate.weights, unknowns_.weights);
-  if (!variables_.known()) derive_id(candidate);
-  candidate.t = ida_.step().t;
-  project_jointly(candidate);
-  inquiry_.probe = Probe::answered;
-  return 0;
 }
 
 void Projection::Impl::choose_step(const Candidate& candidate) {
@@ -119,7 +109,6 @@ void Projection::Impl::choose_step(const Candidate& candidate) {
 
 int Projection::Impl::caught(Status outcome, const char* text) noexcept {
   run_.broken = true;
-  inquiry_.probe = Probe::none;
   return report_.caught(outcome, text);
 }
 

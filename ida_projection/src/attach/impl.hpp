@@ -108,8 +108,6 @@ class Projection::Impl {
     bool& flag_;
     bool before_;
   };
-  enum class Probe { none, asked, answered };
-
   // The attempt that IDA has not yet judged, and the last step.
   struct Attempts {
     long steps = -1, setups = -1;  // IDA's counts at the last attempt
@@ -132,7 +130,6 @@ class Projection::Impl {
 
   // decorator.cpp: the stages of a projected step
   int step(Candidate& candidate, double tolerance, bool call_setup);
-  int probe_candidate(Candidate& candidate);
   void choose_step(const Candidate& candidate);
   int correct(const Candidate& candidate, double tolerance, bool call_setup);
   void begin_move(Candidate& candidate, const StepData& step);
@@ -178,9 +175,9 @@ class Projection::Impl {
                                    Move& move);
 
   // consistency.cpp
-  struct JointStart;
-  bool probe(double t0, N_Vector yy, N_Vector yp);
-  void project_jointly(const Candidate& candidate);
+  struct Inquiry;
+  void probe(double t0, N_Vector yy, N_Vector yp, Inquiry& inquiry);
+  int answer_inquiry(Candidate& candidate);
   void find_derivative(double t0, N_Vector y, N_Vector ydot, const Consistency& how);
   ConsistencyReport project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                                   bool* jointly);
@@ -219,10 +216,6 @@ class Projection::Impl {
     OwnedVector start;              // its first y, of contiguous vectors
     std::string undetermined;       // multipliers at the start, or where correctors fail
   };
-  struct Inquiry {  // make_consistent() looks around
-    Probe probe = Probe::none;
-    JointStart* joint_start = nullptr;
-  };
   // Statistics of the moves.
   struct Tally {
     double move_sum = 0.0;
@@ -248,9 +241,9 @@ class Projection::Impl {
   Metric wanted_metric_;
   MetricChoice metric_choice_;
   Run run_;
-  Inquiry inquiry_;
-  bool in_use_ = false;   // a call of the plugin is under way
-  bool solving_ = false;  // one of IDA
+  Inquiry* inquiry_ = nullptr;  // make_consistent() looks around
+  bool in_use_ = false;         // a call of the plugin is under way
+  bool solving_ = false;        // one of IDA
   Attempts attempts_;
   Tally tally_;
 };

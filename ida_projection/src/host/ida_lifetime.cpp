@@ -57,12 +57,6 @@ void IdaLifetime::watch(N_Vector one, N_Vector other, std::function<void()> at_e
   vector_ = one;
 }
 
-void IdaLifetime::replace(N_Vector v) {
-  v->ops->nvdestroy = destroy;
-  v->ops->nvclone = clone;
-  if (v->ops->nvcloneempty != nullptr) v->ops->nvcloneempty = clone_empty;
-}
-
 IdaLifetime::~IdaLifetime() {
   if (vector_ == nullptr) return;
   const std::lock_guard<std::mutex> lock(guard());
@@ -104,21 +98,21 @@ void IdaLifetime::destroy(N_Vector v) {
   entry.destroy(v);
 }
 
-// A clone copies the table of operations, so that the vector has its original ones meanwhile.
-N_Vector IdaLifetime::clone(N_Vector v) {
+// A clone copies the table, half-made ones too: meanwhile the vector has its own operations.
+template <N_Vector (*_generic_N_Vector_Ops::*Clone)(N_Vector)>
+N_Vector IdaLifetime::clone_by(N_Vector v) {
   const std::lock_guard<std::mutex> lock(guard());
   find(v)->restore(v);
-  N_Vector made = v->ops->nvclone(v);
+  N_Vector made = (v->ops->*Clone)(v);
   replace(v);
   return made;
 }
 
-N_Vector IdaLifetime::clone_empty(N_Vector v) {
-  const std::lock_guard<std::mutex> lock(guard());
-  find(v)->restore(v);
-  N_Vector made = v->ops->nvcloneempty(v);
-  replace(v);
-  return made;
+void IdaLifetime::replace(N_Vector v) {
+  v->ops->nvdestroy = destroy;
+  v->ops->nvclone = clone_by<&_generic_N_Vector_Ops::nvclone>;
+  if (v->ops->nvcloneempty != nullptr)
+    v->ops->nvcloneempty = clone_by<&_generic_N_Vector_Ops::nvcloneempty>;
 }
 
 }  // namespace tether::ida_projection

@@ -30,8 +30,8 @@ class IdaLifetime {
  private:
   static void replace(N_Vector v);
   static void destroy(N_Vector v);
-  static N_Vector clone(N_Vector v);
-  static N_Vector clone_empty(N_Vector v);
+  template <N_Vector (*_generic_N_Vector_Ops::*Clone)(N_Vector)>
+  static N_Vector clone_by(N_Vector v);
 
   N_Vector vector_ = nullptr;  // watched; null: nothing is, or it is gone
   bool over_ = false;

@@ -22,20 +22,51 @@ class Operations {
   static SUNNonlinearSolver make(Owner& owner, SUNNonlinearSolver inner, SUNContext context) {
     SUNNonlinearSolver solver = SUNNonlinSolNewEmpty(context);
     if (solver == nullptr) return nullptr;
+    using Solver = SUNNonlinearSolver;
     solver->content = &owner;
-    solver->ops->gettype = get_type;
-    solver->ops->initialize = initialize;
-    solver->ops->setup = inner->ops->setup != nullptr ? setup : nullptr;
-    solver->ops->solve = solve;
-    solver->ops->free = free_solver;
-    solver->ops->setsysfn = set_system;
-    solver->ops->setlsetupfn = set_linear_setup;
-    solver->ops->setlsolvefn = set_linear_solve;
-    solver->ops->setctestfn = set_convergence_test;
-    solver->ops->setmaxiters = set_maximum_iterations;
-    solver->ops->getnumiters = get_iterations;
-    solver->ops->getcuriter = get_current_iteration;
-    solver->ops->getnumconvfails = get_failures;
+    const SUNNonlinearSolver_Ops ops = solver->ops;
+    ops->gettype = [](Solver s) { return SUNNonlinSolGetType(inner_of(s)); };
+    ops->initialize = [](Solver s) {
+      return shielded(s, [](Owner& ours) { return ours.initialize(); });
+    };
+    if (inner->ops->setup != nullptr)
+      ops->setup = [](Solver s, N_Vector y, void* mem) {
+        return shielded(s, [&](Owner&) { return SUNNonlinSolSetup(inner_of(s), y, mem); });
+      };
+    ops->solve = [](Solver s, N_Vector y0, N_Vector ycor, N_Vector w, sunrealtype tolerance,
+                    Boolean call_setup, void* mem) {
+      return shielded(
+          s, [&](Owner& ours) { return ours.solve(y0, ycor, w, tolerance, call_setup != 0, mem); });
+    };
+    ops->free = [](Solver) { return 0; };  // the Projection owns it
+    ops->setsysfn = [](Solver s, SUNNonlinSolSysFn f) {
+      self(s).corrector().set_system(f);
+      return SUNNonlinSolSetSysFn(inner_of(s), f);
+    };
+    ops->setlsetupfn = [](Solver s, SUNNonlinSolLSetupFn f) {
+      self(s).corrector().set_has_setup(f != nullptr);
+      return SUNNonlinSolSetLSetupFn(inner_of(s), f);
+    };
+    ops->setlsolvefn = [](Solver s, SUNNonlinSolLSolveFn f) {
+      self(s).corrector().set_linear_solve(f);
+      return SUNNonlinSolSetLSolveFn(inner_of(s), f);
+    };
+    ops->setctestfn = [](Solver s, SUNNonlinSolConvTestFn f, void* data) {
+      return self(s).corrector().set_convergence_test(f, data);
+    };
+    ops->setmaxiters = [](Solver s, int n) {
+      self(s).corrector().set_maximum_iterations(n);
+      return SUNNonlinSolSetMaxIters(inner_of(s), n);
+    };
+    ops->getnumiters = [](Solver s, long* n) {
+      const int flag = SUNNonlinSolGetNumIters(inner_of(s), n);
+      *n += self(s).iterations_after_correction();
+      return flag;
+    };
+    ops->getcuriter = [](Solver s, int* n) { return SUNNonlinSolGetCurIter(inner_of(s), n); };
+    ops->getnumconvfails = [](Solver s, long* n) {
+      return SUNNonlinSolGetNumConvFails(inner_of(s), n);
+    };
     return solver;
   }
 
@@ -68,6 +99,7 @@ class Operations {
   }
 
   static Owner& self(SUNNonlinearSolver solver) { return *static_cast<Owner*>(solver->content); }
+  static SUNNonlinearSolver inner_of(SUNNonlinearSolver s) { return self(s).corrector().inner(); }
 
   // No exception passes through IDA's C functions. SUNDIALS' solvers are C as well, and what a C++
   // residual function throws passes through them to here.
@@ -84,53 +116,6 @@ class Operations {
       return ours.caught(Status::callback_fatal, "a callback threw what is no std::exception");
     }
   }
-
-  static SUNNonlinearSolver_Type get_type(SUNNonlinearSolver s) {
-    return SUNNonlinSolGetType(self(s).corrector().inner());
-  }
-  static int initialize(SUNNonlinearSolver s) {
-    return shielded(s, [](Owner& ours) { return ours.initialize(); });
-  }
-  static int setup(SUNNonlinearSolver s, N_Vector y, void* mem) {
-    return shielded(
-        s, [&](Owner& ours) { return SUNNonlinSolSetup(ours.corrector().inner(), y, mem); });
-  }
-  static int solve(SUNNonlinearSolver s, N_Vector y0, N_Vector ycor, N_Vector w,
-                   sunrealtype tolerance, Boolean call_setup, void* mem) {
-    return shielded(
-        s, [&](Owner& ours) { return ours.solve(y0, ycor, w, tolerance, call_setup != 0, mem); });
-  }
-  static int set_system(SUNNonlinearSolver s, SUNNonlinSolSysFn f) {
-    self(s).corrector().set_system(f);
-    return SUNNonlinSolSetSysFn(self(s).corrector().inner(), f);
-  }
-  static int set_linear_setup(SUNNonlinearSolver s, SUNNonlinSolLSetupFn f) {
-    self(s).corrector().set_has_setup(f != nullptr);
-    return SUNNonlinSolSetLSetupFn(self(s).corrector().inner(), f);
-  }
-  static int set_linear_solve(SUNNonlinearSolver s, SUNNonlinSolLSolveFn f) {
-    self(s).corrector().set_linear_solve(f);
-    return SUNNonlinSolSetLSolveFn(self(s).corrector().inner(), f);
-  }
-  static int set_convergence_test(SUNNonlinearSolver s, SUNNonlinSolConvTestFn f, void* data) {
-    return self(s).corrector().set_convergence_test(f, data);
-  }
-  static int set_maximum_iterations(SUNNonlinearSolver s, int n) {
-    self(s).corrector().set_maximum_iterations(n);
-    return SUNNonlinSolSetMaxIters(self(s).corrector().inner(), n);
-  }
-  static int get_iterations(SUNNonlinearSolver s, long* n) {
-    const int flag = SUNNonlinSolGetNumIters(self(s).corrector().inner(), n);
-    *n += self(s).iterations_after_correction();
-    return flag;
-  }
-  static int get_current_iteration(SUNNonlinearSolver s, int* n) {
-    return SUNNonlinSolGetCurIter(self(s).corrector().inner(), n);
-  }
-  static int get_failures(SUNNonlinearSolver s, long* n) {
-    return SUNNonlinSolGetNumConvFails(self(s).corrector().inner(), n);
-  }
-  static int free_solver(SUNNonlinearSolver) { return 0; }  // the Projection owns it
 };
 
 }  // namespace tether::ida_projection
