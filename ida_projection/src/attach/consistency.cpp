@@ -45,7 +45,7 @@ double largest_change(N_Vector from, N_Vector to, int n, int* where) {
 
 }  // namespace
 
-// What the decorated solver is to find out in a step of IDA that goes nowhere.
+// The decorated solver is asked for this in a step of IDA that goes nowhere.
 struct Projection::Impl::Inquiry {
   double t = 0.0;
   N_Vector y = nullptr;  // moved on success, where rows contain algebraic variables of F

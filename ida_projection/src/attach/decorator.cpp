@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 #include "attach/impl.hpp"
 #include "host/mechanisms.hpp"
@@ -46,7 +46,6 @@ int Projection::Impl::initialize() {
   run_.iterative.reset();
   options_.advanced.metric = wanted_metric_;
   attempts_ = Attempts();
-  attempts_.left_before = std::numeric_limits<double>::infinity();
   report_.reset();
   watch_.rejections.reset();
   watch_.first_steps.reset();
@@ -98,7 +97,7 @@ void Projection::Impl::choose_step(const Candidate& candidate) {
     control_.widen_test(candidate, polish_, attempts_.moved, steps);
   // Nearly dependent rows cause long moves, and a row that F does not keep causes one in every
   // step. Neither is a jump of F.
-  const bool long_move = in_use(Mechanism::tested_long_moves) && attempts_.pending &&
+  const bool long_move = in_use(Mechanism::tested_long_moves) && std::isfinite(attempts_.moved) &&
                          attempts_.moved > options_.advanced.largest_move &&
                          attempts_.moved > kSudden * attempts_.accepted_move &&
                          movers_.used->rows().may_test_with_factors();
@@ -168,12 +167,11 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
     check_for_doubts(candidate, step);
   }
   // Moves that do not converge: a wrong C as a rule. Looked into where it is to be said.
-  if (move.status == Status::not_converged && report_.says_failures(attempts_.steps)) {
-    const std::string text = movers_.used->message();
+  if (move.status == Status::not_converged && report_.says_failures(attempts_.steps))
     return finish(move.status,
-                  text + watch_.rejections.suspicion(candidate, corrector_, attempts_.steps));
-  }
-  return finish(move.status, move.capped ? attempts_.capped_message : movers_.used->message());
+                  movers_.used->message() +
+                      watch_.rejections.suspicion(candidate, corrector_, attempts_.steps));
+  return finish(move.status, movers_.used->message());
 }
 
 // Prepares the move of a candidate that the corrector has found.
@@ -238,9 +236,9 @@ bool Projection::Impl::polishes_first() {
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, attempts_.left_before)) return;
   move.status = Status::move_too_long;
-  attempts_.capped_message = "the move onto the constraints, capped at " + brief(move.length) +
-                             " tolerances (Options::largest_move), leaves " + brief(move.left) +
-                             ", which the error test does not allow; use a larger largest_move";
+  movers_.used->rows().message = "the move onto the constraints, capped at " + brief(move.length) +
+                                 " tolerances (Options::largest_move), leaves " + brief(move.left) +
+                                 ", which the error test does not allow; use a larger largest_move";
 }
 
 // Whether IDA accepted an attempt shows in its count of steps at the next one.
@@ -252,9 +250,9 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
   const bool advances = step.t + ida_.step_size() != step.t;
   watch_.rejections.count(attempts_.moved > kPartInTest, attempts_.repeated, advances,
                           attempts_.steps);
-  attempts_.moved = std::numeric_limits<double>::infinity();
+  const bool projected = std::isfinite(std::exchange(attempts_.moved, infinite));
   if (!attempts_.repeated) control_.count_refusals(run_.engaged);
-  if (!attempts_.repeated && attempts_.pending) {
+  if (!attempts_.repeated && projected) {
     attempts_.left_before = attempts_.left;
     attempts_.accepted_move = attempts_.last_move;
     movers_.used->rows().accept();
@@ -265,7 +263,6 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
     }
   }
   attempts_.steps = steps;
-  attempts_.pending = false;
 }
 
 void Projection::Impl::account(const Move& move, const StepData& step) {
@@ -277,7 +274,6 @@ void Projection::Impl::account(const Move& move, const StepData& step) {
   s.largest_move = std::max(s.largest_move, move.length);
   tally_.move_sum += move.length;
   attempts_.last_move = move.length;
-  attempts_.pending = true;
   attempts_.moved = move.length;
   attempts_.left = move.left;
   if (options_.progress) {

@@ -34,6 +34,8 @@ namespace tether::ida_projection {
 /// Rejects values that cannot work, naming the option, its value and the allowed ones.
 void validate(const Constraints& constraints, const Options& options, N_Vector like);
 
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
 /// State of an add-on, which is told when a new run begins.
 class Companion {
  public:
@@ -110,17 +112,15 @@ class Projection::Impl {
   };
   // The attempt that IDA has not yet judged, and the last step.
   struct Attempts {
-    long steps = -1, setups = -1;  // IDA's counts at the last attempt
-    bool repeated = false;         // IDA rejected it
-    double moved = 0.0;            // tolerances; infinity: no point was found
-    double last_move = 0.0;        // that was found, in tolerances
-    double accepted_move = std::numeric_limits<double>::infinity();  // of the last accepted step
-    Progress progress;     // what the caller is told once it is accepted
-    bool pending = false;  // a projected one that is not yet judged
+    long steps = -1, setups = -1;     // IDA's counts at the last attempt
+    bool repeated = false;            // IDA rejected it
+    double moved = infinite;          // tolerances; infinity: no point was found
+    double last_move = 0.0;           // that was found, in tolerances
+    double accepted_move = infinite;  // of the last accepted step
+    Progress progress;                // what the caller is told once it is accepted
     // Lengths that capped moves lacked, in tolerances: in the last accepted step, and in this
     // attempt.
-    double left_before = 0.0, left = 0.0;
-    std::string capped_message;
+    double left_before = infinite, left = 0.0;
     double first_move = 0.0;  // of the last attempt at the first step, in tolerances
     int refused_starts = 0;   // attempts at it with a move that does not shrink
   };
