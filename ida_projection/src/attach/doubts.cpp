@@ -49,7 +49,7 @@ void Projection::Impl::keep_point_before(const Candidate& candidate, OwnedVector
 }
 
 std::string Projection::Impl::undetermined_at(const Candidate& candidate, N_Vector y) {
-  return undetermined_multipliers(candidate, y, variables_, corrector_, constraints_, statistics_);
+  return undetermined_multipliers(candidate, y, variables_, corrector_, watch_.faults, statistics_);
 }
 
 // Names multipliers of too high an index, else returns an empty text. Close to a singular position

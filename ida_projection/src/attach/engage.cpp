@@ -119,7 +119,8 @@ void Projection::Impl::quicken_vectors(const Candidate& candidate) {
   if (options_.nonlinear_solver == nullptr)
     newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
   const StepData step = ida_.step();
-  fast::quicken({candidate.correction, step.residual, polish_.delta(), polish_.corrected()}, false);
+  fast::quicken({candidate.correction, step.residual}, false);
+  polish_.quicken();
   fast::quicken({step.y_predicted, step.yp_predicted, candidate.weights, newton}, true);
 }
 

@@ -1,6 +1,7 @@
 // Tether: the iteration after the move, foretold. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "fast/kernels.hpp"
 #include "host/owned_vector.hpp"
 
 namespace tether::ida_projection {
@@ -15,6 +16,7 @@ class PolishForecast {
     N_VConst(0.0, beyond_);
     work_ = OwnedVector(like);
   }
+  void quicken() const { fast::quicken({beyond_, work_}, false); }
   void forget() { cj_ = 0.0; }
   /// IDA has new factors, made for this cj.
   void renewed(double cj) {

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "host/corrector.hpp"
 #include "start/algebraic.hpp"
+#include "watch/row_faults.hpp"
 
 namespace tether::ida_projection {
 
@@ -15,6 +15,6 @@ namespace tether::ida_projection {
 /// Empty: there are none, or it is not known.
 std::string undetermined_multipliers(const Candidate& candidate, N_Vector y,
                                      const AlgebraicVariables& variables, Corrector& corrector,
-                                     const Constraints& constraints, Statistics& statistics);
+                                     RowFaults& faults, Statistics& statistics);
 
 }  // namespace tether::ida_projection

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "host/shortest.hpp"
+#include "start/undetermined_columns.hpp"
 
 namespace tether::ida_projection {
 
@@ -142,6 +143,19 @@ std::string RowFaults::one_sided(const std::vector<int>& rows, double t,
     }
   }
   return {};
+}
+
+std::vector<std::string> RowFaults::dependent(double t, const std::vector<double>& y,
+                                              const std::vector<double>& WT) {
+  std::vector<std::string> names;
+  if (!may_search(y.size()) || !jacobian(t, y, WT)) return names;
+  const auto n = static_cast<Eigen::Index>(y.size());
+  Eigen::MatrixXd transposed = Eigen::Map<Eigen::MatrixXd>(C_.data(), n, evaluator_.rows());
+  transposed.array().colwise() *= Eigen::Map<const Eigen::ArrayXd>(WT.data(), n);
+  const std::vector<char> found = undetermined_columns(std::move(transposed), false);
+  for (std::size_t i = 0; i < found.size(); ++i)
+    if (found[i]) names.push_back(constraints_.name(static_cast<int>(i)));
+  return names;
 }
 
 double RowFaults::fastest(double t, const std::vector<double>& y, const std::vector<double>& yp) {

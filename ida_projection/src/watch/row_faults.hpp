@@ -41,6 +41,10 @@ class RowFaults {
   /// some direction, and moves to the other. Five evaluations of g for all of them.
   std::string one_sided(const std::vector<int>& rows, double t, const std::vector<double>& y);
 
+  /// Names the rows whose gradients, in tolerances WT, depend on each other.
+  std::vector<std::string> dependent(double t, const std::vector<double>& y,
+                                     const std::vector<double>& WT);
+
   /// dg/dt of each row along y' by differences of g, independent of C, to either side; false: g is
   /// not known. Where F jumps, a row that it keeps has a kink, and only one side agrees. 0 where
   /// the sides contradict.
