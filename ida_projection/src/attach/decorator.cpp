@@ -61,9 +61,9 @@ int Projection::Impl::initialize() {
 
 int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
                             bool call_setup, void* mem) {
-  if (solving_)
+  if (busy_ == Busy::step)
     return finish(Status::misused, "IDASolve was called from a function that IDA is calling");
-  const InUse here(in_use_), solving(solving_);
+  const InUse here(*this, Busy::step);
   ++statistics_.solver_calls;
   polish_.begin();
   if (!run_.initialized)

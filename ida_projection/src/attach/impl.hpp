@@ -88,7 +88,7 @@ class Projection::Impl {
     report.message = why_misused(function, vectors);
     report.status = Status::misused;
     if (report.message.empty()) {
-      const InUse here(in_use_);
+      const InUse here(*this, Busy::call);
       report = call();
     }
     report_.status = report.status;
@@ -99,16 +99,18 @@ class Projection::Impl {
   std::string why_unlike_y(N_Vector v) const;
 
  private:
+  // Under way: nothing, a call of the host, or a step of IDA.
+  enum class Busy { no, call, step };
   class InUse {
    public:
-    explicit InUse(bool& flag) : flag_(flag), before_(std::exchange(flag, true)) {}
-    ~InUse() { flag_ = before_; }
+    InUse(Impl& owner, Busy busy) : owner_(owner), before_(std::exchange(owner.busy_, busy)) {}
+    ~InUse() { owner_.busy_ = before_; }
     InUse(const InUse&) = delete;
     InUse& operator=(const InUse&) = delete;
 
    private:
-    bool& flag_;
-    bool before_;
+    Impl& owner_;
+    Busy before_;
   };
   // The attempt that IDA has not yet judged, and the last step.
   struct Attempts {
@@ -242,8 +244,7 @@ class Projection::Impl {
   MetricChoice metric_choice_;
   Run run_;
   Inquiry* inquiry_ = nullptr;  // make_consistent() looks around
-  bool in_use_ = false;         // a call of the plugin is under way
-  bool solving_ = false;        // one of IDA
+  Busy busy_ = Busy::no;
   Attempts attempts_;
   Tally tally_;
 };

@@ -51,7 +51,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   movers_.own = make_mover(constraints_, options_, statistics_, like, unknowns_.count);
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) {
-    polish_.allocate(like, unknowns_.contiguous);
+    polish_.allocate(like);
     polish_.allow_forecasts();
     unknowns_.weights = OwnedVector(like);
     if (options_.id != nullptr) {
@@ -116,7 +116,7 @@ std::string Projection::Impl::why_misused(const char* function,
                                           std::initializer_list<N_Vector> vectors) const {
   const auto name = [&] { return std::string(function) + ": "; };
   if (lifetime_.over()) return name() + "IDAFree has freed the ida_mem; call it before";
-  if (in_use_)
+  if (busy_ != Busy::no)
     return name() + "called from a function that the plugin is calling; call it between the steps";
   for (N_Vector v : vectors) {
     const std::string wrong = v != nullptr ? why_unlike_y(v) : std::string();

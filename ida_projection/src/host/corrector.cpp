@@ -2,6 +2,7 @@
 #include "host/corrector.hpp"
 
 #include <sunnonlinsol/sunnonlinsol_newton.h>
+#include <utility>
 
 namespace tether::ida_projection {
 
@@ -12,9 +13,9 @@ Corrector::Corrector(SUNNonlinearSolver solver, N_Vector like) : inner_(solver) 
 }
 
 bool Corrector::is_reached_by(const Ida& ida) {
-  reached_ = false;
-  IDASetMaxNonlinIters(ida.mem(), maximum_iterations_);
-  return reached_;
+  const int kept = std::exchange(maximum_iterations_, 0);
+  IDASetMaxNonlinIters(ida.mem(), kept);
+  return std::exchange(maximum_iterations_, kept) == kept;
 }
 
 int Corrector::initialize() {

@@ -26,10 +26,7 @@ class Corrector {
   void set_linear_solve(SUNNonlinSolLSolveFn f) { linear_solve_ = f; }
   void set_has_setup(bool has) { has_setup_ = has; }
   int set_convergence_test(SUNNonlinSolConvTestFn f, void* data);
-  void set_maximum_iterations(int n) {
-    maximum_iterations_ = n;
-    reached_ = true;
-  }
+  void set_maximum_iterations(int n) { maximum_iterations_ = n; }
   int maximum_iterations() const { return maximum_iterations_; }
   /// Whether IDASetMaxNonlinIters arrives at this solver.
   bool is_reached_by(const Ida& ida);
@@ -70,7 +67,6 @@ class Corrector {
   bool has_setup_ =
       false;  // IDA's linear solver has factors, or a preconditioner, that can be renewed
   int maximum_iterations_ = 4;
-  bool reached_ = false;
   void* mem_ = nullptr;
   int stop_flag_ = 0;  // < 0: a callback ended the run in an evaluation of the plugin's own
   std::string stop_text_;

@@ -146,7 +146,7 @@ void SensitivityCorrector::accept() {
 
 // Empty, or why IDAS' vectors cannot be used.
 std::string SensitivityCorrector::set_up(N_Vector predicted) {
-  if (checked_) return "";
+  if (polish_) return "";
   sunrealtype t, cj;
   N_Vector *s = nullptr, *sp, *sn, *spn;
   void* data;
@@ -155,8 +155,7 @@ std::string SensitivityCorrector::set_up(N_Vector predicted) {
   if (!reason.empty()) return reason;
   variables_ = std::make_unique<AlgebraicVariables>(uncounted_);
   polish_ = std::make_unique<Polish>(state_.options_, uncounted_, *corrector_, *variables_);
-  polish_->allocate(predicted, false);
-  checked_ = true;
+  polish_->allocate(predicted);
   return "";
 }
 

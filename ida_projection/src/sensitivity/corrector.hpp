@@ -88,7 +88,7 @@ class SensitivityCorrector final : public Companion {
   std::unique_ptr<AlgebraicVariables> variables_;
   std::unique_ptr<Polish> polish_;
   OwnedVector id_;
-  bool checked_ = false, engaged_ = false;
+  bool engaged_ = false;
   long setups_ = 0, steps_ = -1;
   std::vector<double> saved_weights_;  // of coupled variables, in the last attempt
   long saved_steps_ = -1;              // accepted before it

@@ -10,12 +10,7 @@ namespace tether::ida_projection {
 /// variables; see foretold.cpp.
 class PolishForecast {
  public:
-  /// Called once, before all others.
-  void allocate(N_Vector like) {
-    beyond_ = OwnedVector(like);
-    N_VConst(0.0, beyond_);
-    work_ = OwnedVector(like);
-  }
+  explicit PolishForecast(N_Vector like) : beyond_(like), work_(like) { N_VConst(0.0, beyond_); }
   void quicken() const { fast::quicken({beyond_, work_}, false); }
   void forget() { cj_ = 0.0; }
   /// IDA has new factors, made for this cj.

@@ -27,7 +27,7 @@ constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
 void OrderLimit::reset() {
   end();
   now_ = State();
-  now_.on = wanted_;
+  now_.on = options_.advanced.limit_order;
   now_.wait = kFirstWait;
 }
 

@@ -25,8 +25,7 @@ namespace tether::ida_projection {
 /// steps.
 class OrderLimit {
  public:
-  OrderLimit(void* ida_mem, const Options& options)
-      : ida_mem_(ida_mem), wanted_(options.advanced.limit_order) {}
+  OrderLimit(void* ida_mem, const Options& options) : ida_mem_(ida_mem), options_(options) {}
 
   /// Stiff components have responded to moves: oscillations are likely, and expected at smaller r.
   void expect_oscillations() { now_.stiff = true; }
@@ -79,7 +78,7 @@ class OrderLimit {
   };
 
   void* ida_mem_;
-  bool wanted_;
+  const Options& options_;
   State now_;
 };
 

@@ -32,8 +32,7 @@ constexpr double kNeedsResponseOfMultipliers = 0.01;  // the same for multiplier
 
 }  // namespace
 
-void Polish::allocate(N_Vector like, bool contiguous) {
-  contiguous_ = contiguous;
+void Polish::allocate(N_Vector like) {
   for (OwnedVector* each : {&delta_, &corrected_, &work_, &noise_, &residual_})
     *each = OwnedVector(like);
 }
@@ -105,8 +104,7 @@ const double* Polish::response(const StepData& step) {
 }
 
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (in_use(Mechanism::foretold_polish) && may_forecast_ &&
-      forecast_polish(candidate, cj, tolerance))
+  if (in_use(Mechanism::foretold_polish) && forecast_polish(candidate, cj, tolerance))
     return {true, true};
   const bool asked = step_known_;
   if (!asked) {
@@ -132,17 +130,18 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
 }
 
 void Polish::learn_pattern(const Candidate& candidate, double cj) {
-  if (!may_forecast_) return;
-  if (variables_.any() || corrector_.iterations() != 1) return forecast_.forget();
-  forecast_.learn(candidate.weights, corrected_, delta_, cj);
+  if (!forecast_) return;
+  if (variables_.any() || corrector_.iterations() != 1) return forecast_->forget();
+  forecast_->learn(candidate.weights, corrected_, delta_, cj);
 }
 
 // ycor <- ycor + delta, if delta can be forecast.
 bool Polish::forecast_polish(const Candidate& candidate, double cj, double tolerance) {
-  if (step_known_ || corrector_.iterations() != 1 || !forecast_.tells(cj)) return false;
-  forecast_.tell(cj, corrected_, delta_);
+  if (!forecast_ || step_known_ || corrector_.iterations() != 1 || !forecast_->tells(cj))
+    return false;
+  forecast_->tell(cj, corrected_, delta_);
   if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisledFactor * tolerance)) return false;
-  forecast_.used();
+  forecast_->used();
   N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
   return true;
 }

@@ -2,6 +2,8 @@
 // BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "fast/kernels.hpp"
 #include "host/candidate.hpp"
 #include "host/corrector.hpp"
@@ -27,24 +29,23 @@ class Polish {
          const AlgebraicVariables& variables)
       : options_(options), statistics_(statistics), corrector_(corrector), variables_(variables) {}
 
-  void allocate(N_Vector like, bool contiguous);
+  void allocate(N_Vector like);
   /// Gives its vectors the fast kernels where they are serial.
   void quicken() const {
     fast::quicken({delta_, corrected_, work_, noise_, residual_}, false);
-    forecast_.quicken();
+    if (forecast_) forecast_->quicken();
   }
   /// A new attempt begins.
   void begin() { iterations_ = 0; }
   void note_setup(double cj) {
     cj_at_setup_ = cj;
-    forecast_.renewed(cj);
+    if (forecast_) forecast_->renewed(cj);
   }
-  void corrector_failed() { forecast_.doubt(); }
+  void corrector_failed() {
+    if (forecast_) forecast_->doubt();
+  }
   /// Allows forecasts: every correction of the one vector is polished.
-  void allow_forecasts() {
-    may_forecast_ = true;
-    forecast_.allocate(delta_);
-  }
+  void allow_forecasts() { forecast_.emplace(delta_); }
   void note_linear_solver(bool iterative) { iterative_ = iterative; }
   /// Shares the factors of another polish: sensitivities have the same linear solver.
   void follow(const Polish& other) {
@@ -57,8 +58,8 @@ class Polish {
   bool wanted(double length, bool smoothing) const;
   /// Longer moves need a response of the algebraic variables; infinity if there are none.
   double longest_without_response(bool smoothing) const;
-  /// Whether response() can be computed.
-  bool is_response_available() const { return contiguous_ && corrector_.solves() && !iterative_; }
+  /// Whether response(), of contiguous vectors, can be computed.
+  bool is_response_available() const { return corrector_.solves() && !iterative_; }
   /// After a move: length of the response -J^-1 F_y dy over the differential variables, in
   /// tolerances; -1: F or the linear solver fails.
   double response_length(const Candidate& candidate);
@@ -98,14 +99,12 @@ class Polish {
   Statistics& statistics_;
   Corrector& corrector_;
   const AlgebraicVariables& variables_;
-  bool contiguous_ = false;
   OwnedVector delta_, corrected_, work_, noise_, residual_;
   bool noise_known_ = false;  // -J^-1 F at corrected_
   bool step_known_ = false;   // delta_ is that of the present moved point
   bool iterative_ = false;    // IDA's linear solver is a Krylov method
   double cj_at_setup_ = 0.0;
-  PolishForecast forecast_;
-  bool may_forecast_ = false;
+  std::optional<PolishForecast> forecast_;
   long iterations_ = 0;
 };
 

@@ -28,17 +28,11 @@ constexpr double kOfOrder = 1.348;  // setpoints of neighbouring orders: 6^(1/6)
 
 }  // namespace
 
-StepSmoother::StepSmoother(void* ida_mem, const Options& options)
-    : ida_mem_(ida_mem),
-      wanted_(options.step_smoothing),
-      max_step_(options.advanced.maximum_step),
-      max_order_(options.advanced.maximum_order) {}
-
 void StepSmoother::reset() {
-  const bool was_on = std::exchange(on_, wanted_);
+  const bool was_on = std::exchange(on_, options_.step_smoothing);
   settings_.reset();
   now_ = State();
-  if (on_ || was_on) set({1.0, 2.0, kLargest, 0.0, max_step_});
+  if (on_ || was_on) set({1.0, 2.0, kLargest, 0.0, options_.advanced.maximum_step});
 }
 
 // sigma_k = prod_i i h / (h + now_.h{-1} + .. + now_.h{-i}), i = 1 .. k (Brenan, Campbell and
@@ -72,13 +66,14 @@ void StepSmoother::attempt_was_accepted() {
   if (now_.h >= kNearRefused * now_.refused) now_.refused = 0.0;
   now_.block_sum += now_.log_c;
   ++now_.block;
-  if (now_.order >= max_order_) now_.previous = now_.log_c;
+  if (now_.order >= options_.advanced.maximum_order) now_.previous = now_.log_c;
 }
 
 // A setpoint s makes steps shorter by s^(1/(k+1)). It depends on the order so that steps of all
 // orders become shorter by the same factor.
 double StepSmoother::setpoint(int order) const {
-  const double graded = now_.care.most * std::pow(kOfOrder, order - max_order_);
+  const double graded =
+      now_.care.most * std::pow(kOfOrder, order - options_.advanced.maximum_order);
   return kSetpoint * std::max(graded, std::min(now_.care.least, now_.care.most));
 }
 
@@ -104,10 +99,10 @@ void StepSmoother::note_previous(long steps, double h, int order) {
   if (!same_order) now_.previous.reset();
   if (same_order && now_.known > 0 && !same_size)
     now_.ratio = h / now_.past[0];
-  else if (!same_order || order >= max_order_)
+  else if (!same_order || order >= options_.advanced.maximum_order)
     now_.ratio = 1.0;
   if (same_order && same_size) return;
-  if (same_order && order < max_order_ && now_.block > 0)
+  if (same_order && order < options_.advanced.maximum_order && now_.block > 0)
     now_.previous = now_.block_sum / now_.block;
   now_.end_block();
 }
@@ -128,9 +123,9 @@ double StepSmoother::control(long steps, double norm) {
   now_.log_c = log_c;
   if (!std::isfinite(log_c)) {
     hold();
-  } else if (!wanted_ && far_below(log_c, order) && !near_refused(kLargest * h)) {
+  } else if (!options_.step_smoothing && far_below(log_c, order) && !near_refused(kLargest * h)) {
     return request(kLargest, h, grows, norm);
-  } else if (order >= max_order_) {
+  } else if (order >= options_.advanced.maximum_order) {
     return request(filter(log_c, order), h, grows, norm);
   } else if (now_.block + 1 >= order + 2) {  // with this one, k + 2 steps of one size
     return request(filter((now_.block_sum + log_c) / (now_.block + 1), order), h, grows, norm);
@@ -146,21 +141,23 @@ bool StepSmoother::far_below(double log_c, int order) const {
 }
 
 // Keep h, or reduce it by IDA's own rule.
-void StepSmoother::hold() { set({1.0, kAnyRatio, kLargest, 0.0, max_step_}); }
+void StepSmoother::hold() { set({1.0, kAnyRatio, kLargest, 0.0, options_.advanced.maximum_step}); }
 
 // `grows`: IDA's own ratio is 1 or more.
 double StepSmoother::request(double ratio, double h, bool grows, double norm) {
   if (!grows && ratio < 1.0) {
-    set({1.0, kAnyRatio, kLargest, ratio, max_step_});
+    set({1.0, kAnyRatio, kLargest, ratio, options_.advanced.maximum_step});
   } else if (!grows) {
-    set({0.0, kAnyRatio, kLargest, 0.0, max_step_});
+    set({0.0, kAnyRatio, kLargest, 0.0, options_.advanced.maximum_step});
   } else if (ratio > 1.0) {
-    set({1.0, 1.0, ratio, 0.0, max_step_});
-  } else if (!wanted_) {
+    set({1.0, 1.0, ratio, 0.0, options_.advanced.maximum_step});
+  } else if (!options_.step_smoothing) {
     return reduce_by_weights(ratio, h, norm);
   } else {
     const double longest = h * ratio;
-    set({1.0, 1.0, kLargest, 0.0, max_step_ > 0.0 ? std::min(max_step_, longest) : longest});
+    set({1.0, 1.0, kLargest, 0.0,
+         options_.advanced.maximum_step > 0.0 ? std::min(options_.advanced.maximum_step, longest)
+                                              : longest});
   }
   return 1.0;
 }
@@ -175,7 +172,7 @@ double StepSmoother::reduce_by_weights(double ratio, double h, double norm) {
     hold();
     return 1.0;
   }
-  set({1.0, kAnyRatio, kLargest, ratio, max_step_});
+  set({1.0, kAnyRatio, kLargest, ratio, options_.advanced.maximum_step});
   return factor;
 }
 
@@ -191,7 +188,7 @@ void StepSmoother::set(const Settings& to) {
     IDASetEtaLow(ida_mem_, to.low > 0.0 ? to.low : 0.9);
     IDASetEtaMin(ida_mem_, to.low > 0.0 ? to.low : 0.5);
   }
-  if (wanted_ && changes(&Settings::max_step)) IDASetMaxStep(ida_mem_, to.max_step);
+  if (options_.step_smoothing && changes(&Settings::max_step)) IDASetMaxStep(ida_mem_, to.max_step);
   settings_ = to;
 }
 

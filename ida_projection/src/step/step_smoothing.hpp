@@ -32,7 +32,7 @@ struct Care {
 /// many. The filter approaches sizes that were rejected.
 class StepSmoother {
  public:
-  StepSmoother(void* ida_mem, const Options& options);
+  StepSmoother(void* ida_mem, const Options& options) : ida_mem_(ida_mem), options_(options) {}
 
   /// Before the first step: on only if Options::step_smoothing says so.
   void reset();
@@ -99,9 +99,8 @@ class StepSmoother {
 
   void* ida_mem_;
   std::optional<Settings> settings_;  // IDA has these
-  bool wanted_, on_ = false;
-  double max_step_;
-  int max_order_;
+  const Options& options_;
+  bool on_ = false;
   State now_;
 };
 
