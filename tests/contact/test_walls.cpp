@@ -96,3 +96,27 @@ TEST_CASE("walls: nine bricks, by bodies and by contacts, in a few steps") {
   CHECK(by_bodies < 3e7);  // 8e7 and 3.5e8 by paths
   CHECK(by_contacts < 1.3e8);
 }
+
+// Sweeps end at 1e-5 here; attempts that are cut short end there, too, and repeat each other.
+TEST_CASE("walls: 500 bricks, of which five are hit, by the defaults of BodySolver") {
+  for (double mu : {0.3, 1.0}) {
+    random::Packing wall = random::BrickWall(25, 20, mu).packing();
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> any(-0.5, 0.5);
+    for (std::size_t k = 0; k < wall.bodies.size(); ++k) {
+      wall.bodies[k].velocity = Vector3d(0, 0, -0.05);
+      if (k % 100 == 50)
+        for (int c = 0; c < 3; ++c) {
+          wall.bodies[k].velocity[c] += any(random);
+          wall.bodies[k].angular_velocity[c] = any(random);
+        }
+    }
+    BodyOptions options;
+    options.law = Law::coulomb;
+    const BodySolution s = BodySolver(options).solve(wall.bodies, wall.contacts);
+    INFO("mu " << mu << ": " << name(s.status) << " " << s.error << ", sweeps " << s.sweeps);
+    CHECK(s.status == Status::solved);
+    CHECK(evaluate(wall.bodies, wall.contacts, options.law, s.impulses).fixed_point <= 1e-6);
+    CHECK(s.sweeps <= 6000);
+  }
+}

@@ -14,9 +14,10 @@ namespace {
 
 constexpr double kSlow = 15;  // sweeps forecast, from which on they have momentum
 // An assembled problem is tried after sweeps for kTried of its price, where they are forecast to
-// cost kDearer times that, with work for kRuns of it; later with what leaves it kShareOfSweeps of
-// the work of all sweeps, if that is as much as before.
-constexpr double kTried = 0.15, kDearer = 1.25, kRuns = 2, kShareOfSweeps = 0.5;
+// cost kDearer times that, with work for kRuns of it: walls need up to three. An attempt that
+// begins anew repeats what the one before has done, so each has as much as all before and that
+// again, once sweeps have done as much as they.
+constexpr double kTried = 0.15, kDearer = 1.25, kRuns = 4;
 constexpr int kFew = 64;        // see BodyOptions::min_sweeps
 constexpr double kShare = 0.1;  // of the tolerance, that round-off of the start may be
 
@@ -136,9 +137,8 @@ struct BodySolver::Implementation::Iteration {
   double assembly(double more) {
     if (!momentum.on() || !permitted()) return 0;
     const double once = price.sweeps(), spent = r.spent / price.sweep();
-    const double work = std::max(kRuns * once, kShareOfSweeps * r.sweeps - spent);
-    if (r.sweeps < kTried * once || more < kDearer * once || work < spent) return 0;
-    return std::min(solver.options.max_work, work * price.sweep());
+    if (r.sweeps < std::max(kTried * once, spent) || more < kDearer * once) return 0;
+    return std::min(solver.options.max_work, (spent + kRuns * once) * price.sweep());
   }
 
   Implementation& solver;

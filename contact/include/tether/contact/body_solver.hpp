@@ -61,7 +61,7 @@ struct BodyOptions {
   /// factorisation. 0: never.
   int max_assembled = 100000;
   bool strict = false;    ///< as Options::strict, for assembled islands
-  double max_work = 1e9;  ///< as Options::max_work, for each assembled island; and see max_sweeps
+  double max_work = 3e9;  ///< as Options::max_work, for each assembled island; and see max_sweeps
   double enough = 0;      ///< as Options::enough, for each assembled island
   /// Processes that share the work of each solve, all with the same bodies, contacts and options;
   /// null: none. Outlives the solver. See RankTeam.
