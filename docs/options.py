@@ -70,7 +70,7 @@ def problems():
         for name in sorted(known.keys() - told):
             yield f"{guide}: no table has {known[name][0][0]}::{name}"
     page = (ROOT / "docs" / "scene_fields.md").read_text()
-    source = (ROOT / "scene" / "src" / "files" / "options.hpp").read_text()
+    source = (ROOT / "scene" / "src" / "files" / "read.hpp").read_text()
     parts = "".join(part for part in page.split("\n## ") if re.match(r"\[(?:smooth|stepping|event)\]", part))
     told = {name for row in tables(parts, "field") for name in re.findall(r"`(\w+)`", row[0])}
     read = set(re.findall(r"io\.\w+\(\s*\"(\w+)\"", source))

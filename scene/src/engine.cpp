@@ -5,16 +5,10 @@
 namespace tether::scene {
 
 const char* name(ContactEvent::Kind kind) {
-  using Kind = ContactEvent::Kind;
-  for (const auto& [each, word] :
-       {std::pair(Kind::impact, "impact"), std::pair(Kind::touch, "touch"),
-        std::pair(Kind::lift, "lift"), std::pair(Kind::slip, "slip"), std::pair(Kind::stop, "stop"),
-        std::pair(Kind::rest, "rest"), std::pair(Kind::jam, "jam"),
-        std::pair(Kind::border, "border"), std::pair(Kind::hand_over, "hand_over"),
-        std::pair(Kind::resume, "resume"), std::pair(Kind::roll, "roll"),
-        std::pair(Kind::roll_stop, "roll_stop")})
-    if (each == kind) return word;
-  return "?";
+  constexpr std::array words = {"impact", "touch",  "lift",      "slip",   "stop", "rest",
+                                "jam",    "border", "hand_over", "resume", "roll", "roll_stop"};
+  const auto k = static_cast<std::size_t>(kind);
+  return k < words.size() ? words[k] : "?";
 }
 
 const std::vector<ContactEvent>& Engine::events() const {

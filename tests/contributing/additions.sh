@@ -74,8 +74,7 @@ touches 2 'effect of scenes'
 fresh
 like scene/src/joints/kinds/ball.cpp scene/src/joints/kinds/pivot.cpp 's/Ball/Pivot/g; s/(ball,/(pivot,/; s/::ball/::pivot/'
 edit scene/src/joints/CMakeLists.txt 's,kinds/ball.cpp,& kinds/pivot.cpp,'
-edit scene/include/tether/scene/joint.hpp 's/universal, planar }/universal, planar, pivot }/; s/JointKind>, 7>/JointKind>, 8>/
-  s/^    {"planar", .*/&\n    {"pivot", JointKind::pivot},/'
+edit scene/include/tether/scene/joint.hpp 's/universal, planar }/universal, planar, pivot }/; s/"universal", "planar"/&, "pivot"/'
 make_list scene/src/joints
 compile pivot scene/src/joints/kinds/pivot.cpp scene/src/joints/joint_type.cpp
 touches 3 'joint of scenes'
@@ -91,8 +90,7 @@ fresh
 like scene/src/plan/engines/stepping.cpp scene/src/plan/engines/glider.cpp 's/stepping_engine()/glider_engine()/; s/EngineKind::stepping/EngineKind::glider/'
 edit scene/src/plan/CMakeLists.txt 's,^  engines/event.cpp,  engines/glider.cpp\n&,'
 edit scene/include/tether/scene/scene.hpp 's/smooth, stepping, event }/smooth, stepping, event, glider }/'
-edit scene/include/tether/scene/words.hpp 's/EngineKind>, 4>/EngineKind>, 5>/
-  s/^      {"event", EngineKind::event},/&\n      {"glider", EngineKind::glider},/'
+edit scene/include/tether/scene/words.hpp 's/"stepping", "event"/&, "glider"/'
 make_list scene/src/plan
 compile glider scene/src/plan/engines/glider.cpp scene/src/plan/engine_type.cpp
 touches 4 'engine of scenes'

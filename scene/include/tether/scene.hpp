@@ -5,7 +5,6 @@
 #include <tether/scene/engine.hpp>
 #include <tether/scene/files.hpp>
 #include <tether/scene/joint.hpp>
-#include <tether/scene/place.hpp>
 #include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 #include <tether/scene/scene.hpp>

@@ -138,17 +138,9 @@ CostRow measure_row(const Scene& scene, Setting setting, const std::vector<doubl
 }  // namespace
 
 const char* name(CostMethod method) {
-  switch (method) {
-    case CostMethod::smooth:
-      return "smooth";
-    case CostMethod::events:
-      return "events";
-    case CostMethod::steps:
-      return "steps";
-    case CostMethod::accuracy:
-      return "accuracy";
-  }
-  return "?";
+  constexpr std::array words = {"smooth", "events", "steps", "accuracy"};
+  const auto k = static_cast<std::size_t>(method);
+  return k < words.size() ? words[k] : "?";
 }
 
 const char* setting_name(CostMethod method) {

@@ -6,7 +6,7 @@
 #include "event/model/scene_model.hpp"
 #include "event/resumable.hpp"
 #include "joints/joint_type.hpp"
-#include "mechanics/bodies.hpp"
+#include "mechanics/force.hpp"
 #include "output/binary.hpp"
 #include "smooth/units.hpp"
 

@@ -4,10 +4,9 @@
 #include <fstream>
 
 #include "effects/list.hpp"
-#include "options.hpp"
 #include "record/formats.hpp"
 #include "toml/document.hpp"
-#include "toml/reader.hpp"
+#include "toml/fields.hpp"
 
 namespace tether::scene::files {
 

@@ -1,5 +1,4 @@
 // Tether: a scene as TOML, every default spelt out. SPDX-License-Identifier: BSD-3-Clause
-#include "options.hpp"
 #include "read.hpp"
 
 namespace tether::scene {

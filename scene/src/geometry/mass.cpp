@@ -1,11 +1,9 @@
 // Tether: volume, centre and inertia of shapes. SPDX-License-Identifier: BSD-3-Clause
-#include "mass.hpp"
+#include "shape_type.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <tether/linalg/symmetric_eigen.hpp>
-
-#include "shape_type.hpp"
 
 namespace tether::scene {
 

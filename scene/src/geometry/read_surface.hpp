@@ -1,7 +1,7 @@
 // Tether: meshes and height fields of a scene file. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "toml/reader.hpp"
+#include "toml/fields.hpp"
 
 namespace tether::scene::files {
 

@@ -8,7 +8,7 @@
 #include <tether/linalg/shortest_turn.hpp>
 #include <tether/linalg/symmetric_eigen.hpp>
 
-#include "geometry/mass.hpp"
+#include "geometry/shape_type.hpp"
 #include "robot.hpp"
 #include "xml.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "geometry/mass.hpp"
+#include "geometry/shape_type.hpp"
 #include "import.hpp"
 #include "robot.hpp"
 

@@ -1,9 +1,8 @@
 // Tether: laws along the free coordinates of joints. SPDX-License-Identifier: BSD-3-Clause
-#include "joint_laws.hpp"
+#include "coordinate.hpp"
 
 #include <tether/linalg/pi.hpp>
 
-#include "coordinate.hpp"
 #include "effects/list.hpp"
 #include "joint_type.hpp"
 

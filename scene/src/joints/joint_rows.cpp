@@ -89,6 +89,18 @@ void JointRows::hold_motions() {
   for (Now& each : now_) each.s1 = each.s2 = 0.0;
 }
 
+void JointRows::gradient(const Bodies& bodies, Eigen::MatrixXd& G) const {
+  G.setZero(count_, 6 * bodies.moving);
+  each([&](const auto& row) {
+    each_unit_load(row, bodies,
+                   [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+                     const int slot = bodies.inertia[at(body)].slot;
+                     G.block<1, 3>(row.row + i, 6 * slot) += force.transpose();
+                     G.block<1, 3>(row.row + i, 6 * slot + 3) += torque.transpose();
+                   });
+  });
+}
+
 const std::string& JointRows::joint_of(int row) const {
   int joint = 0;
   each([&](const auto& kind) {

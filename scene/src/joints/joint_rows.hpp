@@ -5,7 +5,7 @@
 #include <type_traits>
 
 #include "coordinate.hpp"
-#include "mechanics/bodies.hpp"
+#include "mechanics/force.hpp"
 #include "rows.hpp"
 
 namespace tether::scene::couplings {
@@ -50,6 +50,8 @@ class JointRows {
   /// The order-th time derivative of every g.
   template <int order>
   void values(const Bodies& bodies, double* g) const;
+  /// G: 6 columns for each moving body, by slot, of its velocity and angular velocity in body axes.
+  void gradient(const Bodies& bodies, Eigen::MatrixXd& G) const;
   /// Calls f(i, body, force, torque in body axes) for the multiplier i of `row` being 1, the others
   /// 0, and each moving body that it acts on.
   template <class Row, class F>

@@ -3,8 +3,6 @@
 
 #include <Eigen/LU>
 
-#include "bodies.hpp"
-
 namespace tether::scene::mechanics {
 
 Bodies placed_bodies(const Scene& scene) {

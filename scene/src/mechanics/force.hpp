@@ -2,11 +2,140 @@
 #pragma once
 
 #include <tether/scene/engine.hpp>
+#include <tether/scene/scene.hpp>
+#include <utility>
+#include <vector>
 
-#include "bodies.hpp"
-#include "entries.hpp"
+#include "frames.hpp"
 
 namespace tether::scene::mechanics {
+
+/// `slot`: index among the moving bodies, -1: it does not move.
+struct Inertia {
+  int slot = -1;
+  double mass = 0;                                                  ///< kg
+  Matrix3d inertia = Matrix3d::Zero(), inverse = Matrix3d::Zero();  ///< body axes, kg m^2
+};
+
+/// All bodies of a scene, then the world.
+struct Bodies {
+  std::vector<Inertia> inertia;
+  std::vector<Frame<double>> frames;
+  std::vector<Vector3d> w;                         ///< angular velocities in body axes
+  std::vector<Eigen::Matrix<double, 3, 4>> turns;  ///< of the moving bodies: turn_of_quaternion
+  int moving = 0;
+  double time = 0, span = 0;  ///< s; forces are means from `time` on over `span`, 0: of that time
+  double since = -1;          ///< when the motion began anew: forces that jump then have jumped
+
+  int world() const { return static_cast<int>(inertia.size()) - 1; }
+  bool moves(int body) const { return inertia[at(body)].slot >= 0; }
+  /// Index of a body of the scene, where -1 is the world.
+  int index(int body) const { return body < 0 ? world() : body; }
+};
+
+/// Point `p` and direction `u` of world axes in the axes of a body.
+inline Vector3d point_in(const Frame<double>& f, const Vector3d& p) {
+  return f.R.transpose() * (p - f.x);
+}
+inline Vector3d direction_in(const Frame<double>& f, const Vector3d& u) {
+  return f.R.transpose() * u;
+}
+
+/// Sum of the forces on a body: force in world axes (N), torque about the centre in body axes and,
+/// apart from it, torque in world axes (N m).
+struct Load6 {
+  Vector3d force, torque_body, torque_world;
+};
+
+/// Frames of all bodies and, last, of the world: positions and attitudes of the scene, at rest; no
+/// inertia, and nothing moves yet.
+Bodies placed_bodies(const Scene& scene);
+
+/// The assembly makes the same calls of add() in the same order every time. So it runs once to
+/// record places; afterwards an entry goes to the slot of the same call, in any storage.
+class Entries {
+ public:
+  std::vector<std::pair<int, int>> places;  ///< row, column of each call
+
+  void record() {
+    places.clear();
+    recording_ = true;
+  }
+  void finish(std::vector<int> slots) {
+    slots_ = std::move(slots);
+    recording_ = false;
+  }
+  const std::vector<int>& slots() const { return slots_; }
+  /// `values`: zero on entry.
+  void begin(double* values) {
+    values_ = values;
+    next_ = 0;
+  }
+  void add(int row, int column, double value) {
+    if (recording_)
+      places.emplace_back(row, column);
+    else
+      values_[slots_[next_++]] += value;
+  }
+
+ private:
+  bool recording_ = false;
+  std::vector<int> slots_;
+  std::size_t next_ = 0;
+  double* values_ = nullptr;
+};
+
+/// 3 x 4: the turn in body axes that a change of the quaternion (wxyz) means, for R(q / |q|).
+inline Eigen::Matrix<double, 3, 4> turn_of_quaternion(const double* q) {
+  Eigen::Matrix<double, 3, 4> L;
+  L << -q[1], q[0], q[3], -q[2],  //
+      -q[2], -q[3], q[0], q[1],   //
+      -q[3], q[2], -q[1], q[0];
+  return L * (2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]));
+}
+
+/// Unknowns of one body.
+constexpr int kPosition = 0, kQuaternion = kPosition + 3, kVelocity = kQuaternion + 4,
+              kSpin = kVelocity + 3, kBody = kSpin + 3;
+
+/// Writes derivatives into rows of a matrix whose columns are the unknowns.
+class JacobianBlocks {
+ public:
+  JacobianBlocks(Entries& entries, const std::vector<Eigen::Matrix<double, 3, 4>>& turns,
+                 int stride, int offset, int row_of_work)
+      : work_row(row_of_work), entries_(entries), turns_(turns), stride_(stride), offset_(offset) {}
+
+  const int work_row;
+
+  /// Row of component i = 0 .. 5 of the equations of motion of a moving body.
+  int motion_row(int slot, int i) const { return stride_ * slot + offset_ + i; }
+  void add(int row, int column, double value) { entries_.add(row, column, value); }
+
+  /// factor * d, the 12 directions of a moving body from `first` on.
+  void add_directions(int row, int slot, const Derivatives& d, int first, double factor) {
+    const int column = kBody * slot;
+    for (int k = 0; k < 3; ++k) add(row, column + kPosition + k, factor * d[first + k]);
+    const Eigen::RowVector4d quaternion =
+        factor * d.segment<3>(first + 3).transpose() * turns_[static_cast<std::size_t>(slot)];
+    for (int k = 0; k < 4; ++k) add(row, column + kQuaternion + k, quaternion[k]);
+    for (int k = 0; k < 6; ++k) add(row, column + kVelocity + k, factor * d[first + 6 + k]);
+  }
+  /// A 3 x 3 block of derivatives to the turn of a body.
+  void add_turn(int row, int slot, const Matrix3d& block) {
+    const Eigen::Matrix<double, 3, 4> d = block * turns_[static_cast<std::size_t>(slot)];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 4; ++k) add(row + i, kBody * slot + kQuaternion + k, d(i, k));
+  }
+  void add_block(int row, int column, const Matrix3d& block) {
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) add(row + i, column + k, block(i, k));
+  }
+
+ private:
+  Entries& entries_;
+  const std::vector<Eigen::Matrix<double, 3, 4>>& turns_;
+  int stride_, offset_;
+};
 
 /// A view of a BodySet with the same bodies. Impulses change the velocities of both.
 class SteppedBodies {

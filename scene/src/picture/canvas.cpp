@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "output/names.hpp"
+#include "output/files.hpp"
 #include "toml/report.hpp"
 
 namespace tether::scene::picture {

@@ -2,7 +2,7 @@
 // BSD-3-Clause
 
 #include "bounds.hpp"
-#include "geometry/mesh.hpp"
+#include "geometry/shape_type.hpp"
 #include "stepping/stepping_engine.hpp"
 
 namespace tether::scene {

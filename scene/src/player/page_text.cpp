@@ -6,7 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "output/names.hpp"
+#include "output/files.hpp"
 
 namespace tether::scene::player {
 

@@ -1,5 +1,5 @@
 // Tether: numbers of the command line. SPDX-License-Identifier: BSD-3-Clause
-#include "arguments.hpp"
+#include "commands.hpp"
 
 #include <fmt/core.h>
 

@@ -7,11 +7,73 @@
 #include <CLI/CLI.hpp>
 #include <string>
 #include <string_view>
+#include <tether/scene/files.hpp>
+#include <tether/scene/run.hpp>
+#include <tether/scene/vary.hpp>
 #include <vector>
 
-#include "process/standard_streams.hpp"
+#include "program/process.hpp"
 
 namespace tether::scene {
+
+// Names of files are those of whoever made the folder: *.toml may hold what a terminal obeys.
+
+/// Lines without what a terminal obeys (files::printable).
+std::string on_terminal(std::string_view text);
+
+/// A field of CSV: quoted where it has to be; control characters become blanks.
+std::string table_field(std::string_view text);
+
+/// Energies, errors and work.
+void print_summary(const Scene& scene, const RunResult& result);
+/// Warnings of what the scene begins with that its author may not have meant.
+void print_start(const Scene& scene);
+/// Times of the engine and of the whole program: `wall` seconds, reading and output included.
+void print_times(const RunResult& result, double wall);
+/// Each [[expect]] with the value found.
+void print_judgements(const Scene& scene, const RunResult& result);
+/// Time spent on each effect.
+void print_costs(const RunResult& result);
+/// Files that were written, and remarks on those that were not.
+void print_files(const RunResult& result);
+/// kGood, kNotMet or kFailed.
+int exit_code(const RunResult& result);
+
+/// A finite number; nothing else has a value.
+std::optional<double> finite_number(const std::string& text);
+/// Refuses all but finite numbers > 0.
+CLI::Validator positive_number();
+
+/// Each item is a number > 0 or a range "1e-3:1e-9", which gives both ends and what lies between
+/// them by factors of `ratio`. std::invalid_argument naming `option` and the item otherwise.
+std::vector<double> read_settings(const std::string& option, const std::vector<std::string>& items,
+                                  double ratio);
+
+struct SceneText {
+  std::string text, name;
+};
+
+/// The text of any file of at most 256 MiB; "-" is the standard input. std::invalid_argument where
+/// it cannot be read.
+SceneText read_text(const std::string& file);
+
+/// "-" is the standard input. Throws SceneError where there is nothing to read.
+SceneText read_scene_text(const std::string& file);
+
+/// The scene of a file or, of "-", of the standard input.
+Scene read_scene_argument(const std::string& file);
+
+/// Throws std::invalid_argument if a path leads to nothing. Values that are wrong are no matter.
+void parse_paths(const SceneText& scene, const std::vector<Setting>& settings);
+
+/// PATH=FROM:TO:COUNT[:log] or PATH=VALUE,VALUE,...
+struct VariedNumber {
+  std::string path;
+  std::vector<double> values;
+};
+
+/// std::invalid_argument naming the word otherwise.
+VariedNumber read_varied(const std::string& word);
 
 void add_check_command(CLI::App& app, int* status);
 void add_contact_command(CLI::App& app, int* status);

@@ -1,5 +1,5 @@
 // Tether: prints what a run gave. SPDX-License-Identifier: BSD-3-Clause
-#include "report_run.hpp"
+#include "commands.hpp"
 
 #include <fmt/core.h>
 #include <fmt/format.h>
@@ -9,7 +9,6 @@
 #include <tether/scene/words.hpp>
 
 #include "bounds.hpp"
-#include "commands.hpp"
 #include "toml/report.hpp"
 
 namespace tether::scene {

@@ -6,9 +6,7 @@
 
 #include "commands.hpp"
 #include "output/files.hpp"
-#include "program/process/signals.hpp"
-#include "program/process/standard_streams.hpp"
-#include "report_run.hpp"
+#include "program/process.hpp"
 
 namespace {
 

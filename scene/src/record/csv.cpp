@@ -8,7 +8,6 @@
 #include "effects/list.hpp"
 #include "formats.hpp"
 #include "output/files.hpp"
-#include "output/names.hpp"
 
 namespace tether::scene {
 

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "output/names.hpp"
+#include "output/files.hpp"
 
 namespace tether::scene::formats {
 

@@ -8,9 +8,8 @@
 #include <fstream>
 
 #include "formats.hpp"
-#include "geometry/mesh.hpp"
+#include "geometry/shape_type.hpp"
 #include "output/files.hpp"
-#include "output/names.hpp"
 
 namespace tether::scene {
 

@@ -7,7 +7,6 @@
 #include "judge.hpp"
 #include "output/binary.hpp"
 #include "output/files.hpp"
-#include "output/names.hpp"
 #include "record/formats.hpp"
 #include "saved_state.hpp"
 #include "stepping/stepping_engine.hpp"

@@ -11,7 +11,6 @@
 
 #include "output/binary.hpp"
 #include "output/files.hpp"
-#include "output/names.hpp"
 #include "plan/engine_type.hpp"
 
 namespace tether::scene {

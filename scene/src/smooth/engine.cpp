@@ -3,7 +3,7 @@
 #include "effects/list.hpp"
 #include "effects/numbers.hpp"
 #include "integrator.hpp"
-#include "mechanics/bodies.hpp"
+#include "mechanics/force.hpp"
 #include "output/binary.hpp"
 #include "units.hpp"
 

@@ -1,5 +1,5 @@
 // Tether: the residual of the equations of motion. SPDX-License-Identifier: BSD-3-Clause
-#include "mechanics/frames.hpp"
+#include "mechanics/pair_forces.hpp"
 #include "system.hpp"
 
 namespace tether::scene::smooth {
@@ -18,14 +18,8 @@ void System::add_multipliers(const double* lambda, std::vector<Load6>& loads) co
     const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
     Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
     row.pull(A, B, lambda + row.row, a, b);
-    const auto put = [&](int body, const Wrench<double>& wrench) {
-      const int slot = bodies.inertia[at(body)].slot;
-      if (slot < 0) return;
-      loads[at(slot)].force += wrench.force;
-      loads[at(slot)].torque_world += wrench.torque;
-    };
-    put(row.first, a);
-    put(row.second, b);
+    put_wrench(bodies, row.first, a, loads);
+    put_wrench(bodies, row.second, b, loads);
   });
 }
 

@@ -22,9 +22,7 @@
 #include "bounds.hpp"
 #include "joints/joint_rows.hpp"
 #include "smooth/rows/rows_in_use.hpp"
-#include "smooth/terms/forward_dynamics.hpp"
-#include "smooth/terms/jacobian_terms.hpp"
-#include "smooth/terms/kept_invariants.hpp"
+#include "smooth/terms.hpp"
 
 namespace tether::scene::smooth {
 

@@ -2,9 +2,45 @@
 #pragma once
 
 #include "effects/list.hpp"
-#include "stepped_joints.hpp"
+#include "joints/coordinate.hpp"
+#include "joints/joint_rows.hpp"
+#include "mechanics/force.hpp"
 
 namespace tether::scene::stepping {
+
+/// The rows that the smooth engine has (joints::JointRows), at the positions of a BodySet with the
+/// bodies of the scene.
+class SteppedJoints final : public contact::JointEquations {
+ public:
+  explicit SteppedJoints(const Scene& scene);
+
+  int rows() const override { return rows_.count(); }
+  void values(const contact::BodySet& bodies, double t, double* g) override;
+  void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
+  /// Impulses by row, over dt, as forces at these positions.
+  std::vector<JointForce> forces(const contact::BodySet& bodies, double t,
+                                 const std::vector<double>& impulses,
+                                 const std::vector<double>& law_impulses, double dt);
+  bool has_laws() const override { return laws_.any(); }
+  void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;
+  std::string name(int joint) const override { return "joint \"" + rows_.name(joint) + "\""; }
+
+ private:
+  /// One row; the first `count` of its bodies are in use.
+  struct Gradient {
+    int joint = 0;
+    double rate = 0;
+    std::size_t count = 0;
+    std::vector<std::pair<int, contact::Vector6d>> on;
+    void add(int body, const mechanics::Wrench<double>& wrench);
+  };
+
+  mechanics::SteppedBodies bodies_;
+  joints::JointRows rows_;
+  joints::Reactions reactions_;
+  joints::JointLaws laws_;
+  std::vector<Gradient> gradients_;  // by row
+};
 
 struct Mapped {
   contact::BodySet bodies;

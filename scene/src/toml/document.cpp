@@ -11,150 +11,69 @@ namespace tether::scene::files {
 
 namespace {
 
-/// Tables and arrays inside each other; a dotted key or header counts for all its parts, which the
-/// parser's own limit does not see though each is a table that it recurses into.
-struct Nesting {
-  int depth = 0;             ///< the deepest
-  int line = 1, column = 1;  ///< where it is reached first
-};
-
 constexpr int kDeepest = 64;
 
-/// One pass over the characters, up to kDeepest. Of a text that is not TOML it may say anything: no
-/// deeper than the part that the parser reads before it refuses. Depth here = parts of the table's
-/// header + parts of the keys and brackets that are open.
+/// Finds where tables and arrays are more than kDeepest inside each other; npos: nowhere. A dotted
+/// key or header counts for all its parts, which the parser's own limit does not see though each is
+/// a table that it recurses into. A text that is not TOML may get any answer: no deeper than the
+/// part that the parser reads before it refuses.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : text_(text) {}
 
-  Nesting scan() {
-    while (at_ < text_.size() && deepest_.depth <= kDeepest) step();
-    return deepest_;
+  std::size_t too_deep() {
+    for (; at_ < text_.size(); ++at_) {
+      step(text_[at_]);
+      if (header_ + inside_ + key_ + parts_ > kDeepest) return at_;
+    }
+    return std::string_view::npos;
   }
 
  private:
-  void step() {
-    const char c = text_[at_];
-    switch (c) {
-      case '#':
-        skip_to_line_end();
-        return;
-      case '"':
-      case '\'':
-        skip_string(c);
-        return;
-      case '\n':
-        if (open_.empty()) end_of_line();
-        break;
-      case '.':
-        ++parts_;
-        look();
-        break;
-      case '=':
-        in_value_ = true;
-        key_ = parts_;  // its value may open brackets
-        parts_ = 1;
-        break;
-      case ',':
-        parts_ = 1;
-        key_ = 0;
-        break;
-      case '[':
-      case '{':
-        bracket(c);
-        break;
-      case ']':
-      case '}':
-        close();
-        break;
-      default:
-        break;
+  void step(char c) {
+    if (c == '#') at_ = std::min(text_.find('\n', at_), text_.size()) - 1;
+    if (c == '"' || c == '\'') skip_string(c);
+    if (c == '.') ++parts_;
+    if (c == '=') begin_part(parts_);  // its value may open brackets
+    if (c == ',' || (c == '\n' && open_.empty())) begin_part(0);
+    if (c == '[' || c == '{') {
+      if (open_.empty() && key_ == 0) is_header_ = true, header_ = 0;
+      open_.push_back(key_ + 1);
+      inside_ += open_.back();
+      begin_part(0);
     }
-    advance();
-  }
-
-  void bracket(char c) {
-    if (c == '[' && open_.empty() && !in_value_) {  // a header
-      ++in_header_;
-      header_ = 0;
-      parts_ = 1;
-      return;
-    }
-    open_.push_back(key_ + 1);
-    sum_ += open_.back();
-    key_ = 0;
-    parts_ = 1;
-    look();
-  }
-
-  void close() {
-    if (in_header_ > 0) {
-      header_ = parts_ + 1;
-      --in_header_;
-    } else if (!open_.empty()) {
-      sum_ -= open_.back();
+    if ((c == ']' || c == '}') && !open_.empty()) {
+      inside_ -= open_.back();
       open_.pop_back();
+      if (open_.empty() && is_header_) header_ = parts_ + 1, is_header_ = false;
     }
-    key_ = 0;
   }
-
-  void end_of_line() {
-    in_value_ = false;
-    in_header_ = 0;
+  void begin_part(int key) {
+    key_ = key;
     parts_ = 1;
-    key_ = 0;
   }
-
-  void look() {
-    const int depth = (in_header_ > 0 ? 0 : header_) + sum_ + key_ + parts_;
-    if (depth <= deepest_.depth) return;
-    deepest_ = {depth, line_, static_cast<int>(at_ - line_start_) + 1};
-  }
-
-  void advance() {
-    if (text_[at_] == '\n') {
-      ++line_;
-      line_start_ = at_ + 1;
-    }
-    ++at_;
-  }
-
-  void skip_to_line_end() {
-    while (at_ < text_.size() && text_[at_] != '\n') ++at_;
-  }
-
   // A string is of one line, or between three quotes of any number of lines; ' knows no escapes.
+  // Ends at its last quote.
   void skip_string(char quote) {
-    const bool lines = text_.substr(at_, 3) == std::string_view(quote == '"' ? "\"\"\"" : "'''");
-    at_ += lines ? 3 : 1;
-    while (at_ < text_.size()) {
+    const std::string three(3, quote);
+    const bool lines = text_.substr(at_, 3) == three;
+    for (at_ += lines ? 3 : 1; at_ < text_.size(); ++at_) {
       const char c = text_[at_];
       if (c == '\n' && !lines) return;  // no TOML
-      if (c == '\\' && quote == '"' && at_ + 1 < text_.size()) {
-        advance();
-      } else if (c == quote) {
-        if (!lines) {
-          ++at_;
-          return;
-        }
-        std::size_t count = 0;
-        while (at_ + count < text_.size() && text_[at_ + count] == quote) ++count;
-        at_ += count;
-        if (count >= 3) return;  // up to two more quotes belong to the text
-        continue;
-      }
-      advance();
+      if (c == '\\' && quote == '"') ++at_;
+      if (c != quote || (lines && text_.substr(at_, 3) != three)) continue;
+      // Up to two more quotes belong to the text.
+      at_ = std::min(text_.find_first_not_of(quote, at_), text_.size()) - 1;
+      return;
     }
   }
 
   std::string_view text_;
-  std::size_t at_ = 0, line_start_ = 0;
-  int line_ = 1;
+  std::size_t at_ = 0;
   std::vector<int> open_;  // of each open bracket: 1 and the parts of the key before it
-  int sum_ = 0;            // of these
-  int header_ = 0, parts_ = 1, key_ = 0, in_header_ = 0;
-  bool in_value_ = false;
-  Nesting deepest_;
+  int inside_ = 0;         // the sum of these
+  int header_ = 0, key_ = 0, parts_ = 1;
+  bool is_header_ = false;
 };
 
 Value plain(toml::node& node, int lines_before);
@@ -329,13 +248,14 @@ Entry* find_entry(Value& table, std::string_view key) {
 }
 
 Value parse_document(std::string_view text, const std::string& name) {
-  const Nesting nesting = Scanner(text).scan();
-  if (nesting.depth > kDeepest)
-    refuse(
-        {name, nesting.line, nesting.column},
-        fmt::format("more than {} tables and arrays inside each other; dotted keys count for all "
-                    "their parts",
-                    kDeepest));
+  if (const std::size_t at = Scanner(text).too_deep(); at != std::string_view::npos) {
+    const std::string_view before = text.substr(0, at);
+    const auto line = 1 + std::count(before.begin(), before.end(), '\n');
+    refuse({name, static_cast<int>(line), static_cast<int>(at - before.rfind('\n'))},
+           fmt::format("more than {} tables and arrays inside each other; dotted keys count for "
+                       "all their parts",
+                       kDeepest));
+  }
   try {
     if (std::optional<Value> document = parse_pieces(text, name, kPiece))
       return std::move(*document);

@@ -1,5 +1,5 @@
 // Tether: values and tables as TOML. SPDX-License-Identifier: BSD-3-Clause
-#include "writer.hpp"
+#include "form.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,5 @@
-// Tether: joints and their prescribed motions. SPDX-License-Identifier: BSD-3-Clause
+// Tether: joints and their prescribed motions, places in files. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <Eigen/Core>
@@ -7,11 +8,28 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <tether/scene/place.hpp>
 #include <utility>
 #include <vector>
 
 namespace tether::scene {
+
+/// A place in a file.
+struct Place {
+  std::string file;          ///< its name
+  int line = 0, column = 0;  ///< from 1; line 0: made by a program; column 0: not known
+};
+
+/// The words of files for the enumerators of E, which are counted from 0 on.
+template <class E, std::size_t n>
+constexpr std::array<std::pair<std::string_view, E>, n> in_order(
+    const std::string_view (&words)[n]) {
+  std::array<std::pair<std::string_view, E>, n> list{};
+  for (std::size_t k = 0; k < n; ++k) {
+    list[k].first = words[k];
+    list[k].second = static_cast<E>(k);
+  }
+  return list;
+}
 
 /// s(t) = rate t + amplitude sin(2 pi frequency t + phase) - amplitude sin(phase), so that s(0) =
 /// 0.
@@ -62,15 +80,8 @@ struct Coupling {
 enum class JointKind : std::uint8_t { distance, ball, hinge, slider, fixed, universal, planar };
 
 /// The words of files for them.
-inline constexpr std::array<std::pair<std::string_view, JointKind>, 7> kJointWords{{
-    {"distance", JointKind::distance},
-    {"ball", JointKind::ball},
-    {"hinge", JointKind::hinge},
-    {"slider", JointKind::slider},
-    {"fixed", JointKind::fixed},
-    {"universal", JointKind::universal},
-    {"planar", JointKind::planar},
-}};
+inline constexpr auto kJointWords =
+    in_order<JointKind>({"distance", "ball", "hinge", "slider", "fixed", "universal", "planar"});
 
 /// `first` and `second` are indices of bodies, -1 the world. Points and axes in world coordinates
 /// at t = 0. A motion prescribes the angle of a hinge (rad, of first against second about axis),

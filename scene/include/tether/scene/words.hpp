@@ -59,74 +59,37 @@ struct Words<JointKind> {
 
 template <>
 struct Words<InvariantKind> {
-  static constexpr std::array<std::pair<std::string_view, InvariantKind>, 3> list{{
-      {"energy", InvariantKind::energy},
-      {"momentum", InvariantKind::momentum},
-      {"angular_momentum", InvariantKind::angular_momentum},
-  }};
+  static constexpr auto list = in_order<InvariantKind>({"energy", "momentum", "angular_momentum"});
 };
 
 template <>
 struct Words<Formulation> {
-  static constexpr std::array<std::pair<std::string_view, Formulation>, 3> list{{
-      {"index1", Formulation::index1},
-      {"index0", Formulation::index0},
-      {"stabilised_index2", Formulation::stabilised_index2},
-  }};
+  static constexpr auto list = in_order<Formulation>({"index1", "index0", "stabilised_index2"});
 };
 
 template <>
 struct Words<EngineKind> {
-  static constexpr std::array<std::pair<std::string_view, EngineKind>, 4> list{{
-      {"automatic", EngineKind::automatic},
-      {"smooth", EngineKind::smooth},
-      {"stepping", EngineKind::stepping},
-      {"event", EngineKind::event},
-  }};
+  static constexpr auto list = in_order<EngineKind>({"automatic", "smooth", "stepping", "event"});
 };
 
 template <>
 struct Words<OnFailure> {
-  static constexpr std::array<std::pair<std::string_view, OnFailure>, 2> list{{
-      {"stop", OnFailure::stop},
-      {"warn", OnFailure::warn},
-  }};
+  static constexpr auto list = in_order<OnFailure>({"stop", "warn"});
 };
 
 template <>
 struct Words<Otherwise> {
-  static constexpr std::array<std::pair<std::string_view, Otherwise>, 2> list{{
-      {"stop", Otherwise::stop},
-      {"stepping", Otherwise::stepping},
-  }};
+  static constexpr auto list = in_order<Otherwise>({"stop", "stepping"});
 };
 
 template <>
 struct Words<Quantity> {
-  static constexpr std::array<std::pair<std::string_view, Quantity>, 22> list{{
-      {"position", Quantity::position},
-      {"velocity", Quantity::velocity},
-      {"orientation", Quantity::orientation},
-      {"angular_velocity", Quantity::angular_velocity},
-      {"distance_moved", Quantity::distance_moved},
-      {"speed", Quantity::speed},
-      {"contact_force", Quantity::contact_force},
-      {"contact_slip", Quantity::contact_slip},
-      {"kinetic_energy", Quantity::kinetic_energy},
-      {"potential_energy", Quantity::potential_energy},
-      {"energy", Quantity::energy},
-      {"energy_change", Quantity::energy_change},
-      {"momentum", Quantity::momentum},
-      {"angular_momentum", Quantity::angular_momentum},
-      {"drift", Quantity::drift},
-      {"contacts", Quantity::contacts},
-      {"penetration", Quantity::penetration},
-      {"residual", Quantity::residual},
-      {"joint_force", Quantity::joint_force},
-      {"joint_moment", Quantity::joint_moment},
-      {"joint_drive", Quantity::joint_drive},
-      {"spring_force", Quantity::spring_force},
-  }};
+  static constexpr auto list = in_order<Quantity>(
+      {"position",    "velocity",      "orientation",  "angular_velocity", "distance_moved",
+       "speed",       "contact_force", "contact_slip", "kinetic_energy",   "potential_energy",
+       "energy",      "energy_change", "momentum",     "angular_momentum", "drift",
+       "contacts",    "penetration",   "residual",     "joint_force",      "joint_moment",
+       "joint_drive", "spring_force"});
 };
 
 /// @endcond

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "geometry/shape_type.hpp"
-#include "mechanics/bodies.hpp"
+#include "mechanics/force.hpp"
 #include "scene_model.hpp"
 
 namespace tether::scene::event {

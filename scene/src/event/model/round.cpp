@@ -1,7 +1,7 @@
 // Tether: contacts of ellipsoids and of the ends of cylinders. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "round.hpp"
 #include "bounds.hpp"
+#include "features.hpp"
 
 #include <Eigen/LU>
 

@@ -223,20 +223,12 @@ void SceneModel::forces(VectorXd& h) {
 void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) {
   const Bodies& bodies = bodies_.all();
   g.resize(rows_.count());
-  W.setZero(rows_.count(), velocities());
+  rows_.gradient(bodies, W);
   rate.resize(rows_.count());
   rest.resize(rows_.count());
   rows_.values<0>(bodies, g.data());
   rows_.values<2>(bodies, rest.data());
-  rows_.each([&](const auto& row) {
-    row.rate_by_time(rate.data() + row.row);
-    joints::JointRows::each_unit_load(
-        row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
-          const int slot = bodies.inertia[at(body)].slot;
-          W.block<1, 3>(row.row + i, 6 * slot) += force.transpose();
-          W.block<1, 3>(row.row + i, 6 * slot + 3) += torque.transpose();
-        });
-  });
+  rows_.each([&](const auto& row) { row.rate_by_time(rate.data() + row.row); });
 }
 
 void SceneModel::evaluate_contact(int contact, ContactKinematics& out) {

@@ -4,7 +4,7 @@
 
 #include "bounds.hpp"
 #include "features.hpp"
-#include "joints/joint_laws.hpp"
+#include "joints/coordinate.hpp"
 #include "joints/joint_rows.hpp"
 #include "mechanics/force.hpp"
 #include "model.hpp"

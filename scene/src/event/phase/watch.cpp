@@ -2,7 +2,7 @@
 #include "watch.hpp"
 
 #include "bounds.hpp"
-#include "event/model/touch.hpp"
+#include "event/model/features.hpp"
 #include "friction_solve.hpp"
 
 namespace tether::scene::event {

@@ -17,7 +17,6 @@
 
 #include "bounds.hpp"
 #include "joints/coordinate.hpp"
-#include "joints/joint_laws.hpp"
 #include "joints/laws/joint_law_effect.hpp"
 #include "mechanics/pair_forces.hpp"
 

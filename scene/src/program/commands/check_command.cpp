@@ -4,9 +4,7 @@
 #include <tether/scene/plan.hpp>
 
 #include "plan/engine_type.hpp"
-#include "program/arguments.hpp"
 #include "program/commands.hpp"
-#include "program/report_run.hpp"
 
 namespace tether::scene {
 

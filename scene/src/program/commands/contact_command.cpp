@@ -1,6 +1,5 @@
 // Tether: `tether contact`: solves contact problems in files. SPDX-License-Identifier: BSD-3-Clause
 #include "program/commands.hpp"
-#include "program/report_run.hpp"
 
 #include <cstdio>
 #include <filesystem>
@@ -90,7 +89,7 @@ int run(const ContactArguments& arguments) {
   }
   for (const std::string& file : arguments.files) {
     try {
-      Problem problem;
+      contact::Problem problem;
       try {
         problem = read_problem(file);
       } catch (const std::runtime_error&) {

@@ -6,11 +6,8 @@
 #include <tether/scene/cost.hpp>
 
 #include "output/files.hpp"
-#include "output/names.hpp"
-#include "program/arguments.hpp"
 #include "program/commands.hpp"
-#include "program/process/signals.hpp"
-#include "program/report_run.hpp"
+#include "program/process.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

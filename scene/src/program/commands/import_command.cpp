@@ -8,8 +8,7 @@
 #include <iostream>
 
 #include "import/import.hpp"
-#include "output/names.hpp"
-#include "program/arguments.hpp"
+#include "output/files.hpp"
 #include "program/commands.hpp"
 #include "record/formats.hpp"
 

@@ -9,9 +9,7 @@
 
 #include "output/files.hpp"
 #include "program/commands.hpp"
-#include "program/process/signals.hpp"
-#include "program/process/standard_streams.hpp"
-#include "program/report_run.hpp"
+#include "program/process.hpp"
 
 namespace tether::scene {
 

@@ -4,10 +4,8 @@
 #include <iostream>
 #include <tether/scene/plan.hpp>
 
-#include "program/arguments.hpp"
 #include "program/commands.hpp"
-#include "program/process/signals.hpp"
-#include "program/report_run.hpp"
+#include "program/process.hpp"
 
 namespace tether::scene {
 

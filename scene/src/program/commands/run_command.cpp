@@ -6,12 +6,9 @@
 #include <filesystem>
 #include <progress.hpp>
 
-#include "program/arguments.hpp"
 #include "program/commands.hpp"
-#include "program/process/signals.hpp"
-#include "program/process/standard_streams.hpp"
+#include "program/process.hpp"
 #include "program/ranks/ranks.hpp"
-#include "program/report_run.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

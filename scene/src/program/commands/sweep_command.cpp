@@ -11,13 +11,8 @@
 #include "bounds.hpp"
 #include "lists.hpp"
 #include "output/files.hpp"
-#include "output/names.hpp"
-#include "program/arguments.hpp"
 #include "program/commands.hpp"
-#include "program/process/signals.hpp"
-#include "program/process/standard_streams.hpp"
-#include "program/process/worker_processes.hpp"
-#include "program/report_run.hpp"
+#include "program/process.hpp"
 #include "record/formats.hpp"
 
 namespace tether::scene {

@@ -1,5 +1,5 @@
 // Tether: the gradient of many joints and its factors. SPDX-License-Identifier: BSD-3-Clause
-#include "joint_gradient.hpp"
+#include "rows_in_use.hpp"
 
 #include <Eigen/Cholesky>
 

@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <tether/linalg/symmetric_eigen.hpp>
 
-#include "mechanics/bodies.hpp"
+#include "mechanics/force.hpp"
 #include "mechanics/frames.hpp"
 
 namespace tether::scene::smooth {

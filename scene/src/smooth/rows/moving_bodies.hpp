@@ -3,8 +3,7 @@
 
 #include <tether/scene/engine.hpp>
 
-#include "mechanics/bodies.hpp"
-#include "mechanics/entries.hpp"
+#include "mechanics/force.hpp"
 
 namespace tether::scene::smooth {
 

@@ -2,11 +2,109 @@
 #pragma once
 
 #include <tether/linalg/pivoted_qr.hpp>
+#include <tether/linalg/sparse_minimum_norm.hpp>
 
-#include "joint_gradient.hpp"
-#include "sparse_row_choice.hpp"
+#include "joints/joint_rows.hpp"
+#include "moving_bodies.hpp"
 
 namespace tether::scene::smooth {
+
+using joints::JointRows;
+
+/// G (rows x 6 velocities of each moving body, angular ones in body axes), G M^-1 and G M^-1 G^T.
+struct JointGradient {
+  Eigen::MatrixXd G, GM, S;
+
+  void form(const JointRows& rows, const MovingBodies& bodies);
+};
+
+using joints::JointRows;
+
+/// C = G M^-1/2 with G as in JointGradient, by its entries: six for each row and body.
+class SparseJointGradient {
+ public:
+  SparseJointGradient(const JointRows& rows, const MovingBodies& bodies);
+
+  /// At the state that is set. Rows that are not wanted count as zero; `dependent`: how short what
+  /// others leave of a row of unit length, in the metric of M, is if it is to depend on them.
+  void factor();
+  void factor(const std::vector<char>& wanted, double dependent);
+  /// After factor(): 1 for each row that is wanted and depends on none of the others; their number.
+  int independent(std::vector<char>& rows) const;
+  /// After factor(): what rows before row i in the order of elimination leave of it, 0 to 1.
+  double independent_part(int i) const { return factors_.independent_part(i); }
+  /// After factor(): a row that depends on others, and those that matter in it; none: empty.
+  std::vector<int> dependent() const;
+  /// Finds a with G a = right of least kinetic energy a^T M a / 2, and lambda with M a = G^T
+  /// lambda.
+  void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
+  /// Takes from velocities v what the factored rows forbid.
+  void release(Eigen::VectorXd& v);
+  /// Product of G with each moving body's velocities.
+  void multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const;
+  /// Diagonal of G M^-1 G^T; after factor().
+  Eigen::VectorXd size_of_rows() const;
+
+ private:
+  void factor(const char* wanted, double rank_tolerance);
+  void add_least(double share, Eigen::VectorXd& a) const;  // share times the last solution
+  template <class Put>
+  void each_entry(const Put& put) const;
+
+  const JointRows& rows_;
+  const MovingBodies& bodies_;
+  std::vector<Eigen::Matrix3d> roots_;  // L of each moving body's inverse inertia L L^T
+  std::vector<int> starts_;
+  linalg::SparseMinimumNorm factors_;
+  Eigen::VectorXd least_, rates_;
+};
+
+/// Rows whose weakest pivot is less than this part of another set's are much worse.
+constexpr double kMuchWorse = 0.1;
+
+/// A set of rows, one entry each, and how far its rows are from depending on each other: the least
+/// that those before it leave of one, in the metric of M; 1 without rows, 0 where some do.
+struct RowSet {
+  std::vector<char> has;
+  int count = 0;
+  double weakest = 1;
+};
+
+/// Rows of joints chosen by the entries of their gradient: those that the projection keeps and
+/// those that carry multipliers. What RowsInUse says of them, for scenes with many closed loops.
+class SparseRowChoice {
+ public:
+  /// Finds out, near the start of the scene, how many rows are independent where it moves; leaves
+  /// `bodies` in some other state.
+  SparseRowChoice(JointRows& rows, MovingBodies& bodies);
+
+  /// At the state that is set; rows of which others leave less than `weak` are not kept. True:
+  /// other rows carry multipliers now.
+  bool choose(double weak);
+  bool keeps(int row) const { return kept_.has[at(row)] != 0; }
+  const RowSet& carriers() const { return carriers_; }
+  /// From which weakest pivot of the carriers on nothing is to be feared for some steps.
+  double good() const;
+
+ private:
+  RowSet independent_among(const std::vector<char>& wanted, double dependent);
+  void add_thin(RowSet& set);
+  RowSet best(int count, double weak);
+  double reach() const;
+  void move(std::vector<double>& y, const Eigen::VectorXd& v) const;
+  void move_freely(std::vector<double>& y);
+  void close(std::vector<double>& y);
+
+  JointRows& rows_;
+  MovingBodies& bodies_;
+  SparseJointGradient gradient_;
+  std::vector<char> all_;
+  RowSet kept_, carriers_;
+  int seen_ = 0;              // of the carriers, those that the factors tell from dependent ones
+  double usual_ = 1;          // the largest that their weakest pivot was so far
+  double weakest_found_ = 0;  // of the carriers at the last search for better ones
+  int steps_to_search_ = 0;   // until the next one
+};
 
 /// The rows that the projection keeps, and those that carry multipliers, chosen along the motion
 /// where rows depend on each other; see rows_in_use.cpp.

@@ -11,7 +11,7 @@
 // another mechanism, whose joints drift. The factors tell them from dependent ones to about
 // sqrt(eps) times the coefficients; the rest show in velocities that the others allow. What is thin
 // all along is no singular position: that is where pivots are much smaller than elsewhere.
-#include "sparse_row_choice.hpp"
+#include "rows_in_use.hpp"
 
 #include <tether/linalg/pivoted_qr.hpp>
 

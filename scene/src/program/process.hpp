@@ -2,9 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <functional>
+#include <string>
 #include <tether/scene/scene.hpp>
+#include <vector>
 
 namespace tether::scene {
+
+/// From now on the first SIGINT, SIGTERM or SIGHUP is only noted; one that comes a second later or
+/// more ends the program. SIGHUP stays ignored where it is (nohup).
+void catch_signals();
+
+/// 0: none yet.
+int caught_signal();
 
 /// Exit codes of `tether`.
 enum ExitCode : int {
@@ -59,6 +70,25 @@ class StandardOutputFile {
  private:
   std::string folder_, file_;
   std::unique_ptr<StandardOutput> out_;
+};
+
+/// Some processes do jobs 0 to n - 1, each the next one that nobody has begun. A job whose process
+/// dies is lost, the others go on.
+class WorkerProcesses {
+ public:
+  explicit WorkerProcesses(unsigned processes) : processes_(processes) {}
+
+  std::function<std::string(std::size_t)> work;         ///< in a process of its own
+  std::function<std::string(const std::string&)> lost;  ///< result of a job whose process died
+  std::function<bool()> stopped;                        ///< true: no more jobs are begun
+  std::function<void(std::size_t)> progress;            ///< jobs that are done
+
+  /// Results in the order of the jobs; empty: not begun. Throws std::runtime_error where there are
+  /// no processes to be had.
+  std::vector<std::string> run(std::size_t jobs);
+
+ private:
+  unsigned processes_;
 };
 
 }  // namespace tether::scene

@@ -1,0 +1,125 @@
+// Tether: derivatives of forces and rows of joints. SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Cholesky>
+
+#include "dimensions.hpp"
+#include "joints/joint_rows.hpp"
+#include "mechanics/force.hpp"
+#include "smooth/rows/moving_bodies.hpp"
+#include "smooth/rows/rows_in_use.hpp"
+
+namespace tether::scene::smooth {
+
+using Forces = std::vector<std::unique_ptr<Force>>;
+/// A Jacobian of constraints, in the storage of the projection.
+using ConstraintRows =
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+
+/// Values at the state that is set, minus those at the start. Work of forces without potential is
+/// an unknown: energy minus work is kept.
+class KeptInvariants {
+ public:
+  /// `work` is the index of the unknown in y. Throws std::invalid_argument, naming what changes an
+  /// invariant from outside.
+  KeptInvariants(const Scene& scene, const MovingBodies& bodies, const Forces& forces, int work);
+
+  int count() const { return static_cast<int>(kept_.size()); }
+  bool has_work() const { return has_work_; }
+  /// Values at the start, to save and to set.
+  std::vector<double>& kept() { return kept_; }
+  /// Keeps those of the state that is set from now on.
+  void keep(double t, const double* y);
+
+  double energy() const;
+  void values(double t, const double* y, double* g) const;
+  void jacobian(ConstraintRows C, int row) const;
+  void add_names(std::vector<std::string>& names) const;
+  /// Unit of each value in SI.
+  std::vector<double> units(const Units& units) const;
+
+ private:
+  const MovingBodies& bodies_;
+  const Forces& forces_;
+  int work_;
+  bool has_work_ = false, energy_ = false, momentum_ = false;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> axes_;  // of angular momentum about the origin
+  Vector3d steady_force_ = Vector3d::Zero();       // momentum grows by it
+  std::vector<double> kept_;
+};
+
+/// M a = f + G^T lambda and G a = -gamma. Few rows: dense, with a diagonal term of 1e-11 in
+/// G M^-1 G^T, refined three times, so that it decides only where the rows do not. Many: by the
+/// entries of G; gradient() and solve_rows() are then not to be had.
+class ForwardDynamics {
+ public:
+  /// Sets the state at the start of the scene. `gradient`: it will be asked for.
+  ForwardDynamics(JointRows& rows, MovingBodies& bodies, bool gradient);
+
+  /// At the state that is set; torques in body axes. Leaves the accelerations of the frames at 0.
+  void solve(const std::vector<Load6>& loads);
+  /// Puts the accelerations into the frames.
+  void set_accelerations();
+
+  const Eigen::VectorXd& multipliers() const { return lambda_; }
+  const Eigen::VectorXd& accelerations() const { return a_; }
+  const JointGradient& gradient() const { return gradient_; }
+  /// Diagonal of G M^-1 G^T at the start.
+  const Eigen::VectorXd& size_of_row() const { return size_of_row_; }
+  /// dlambda of a right side, by the factors of the last solve().
+  Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& right) const { return factor_.solve(right); }
+
+ private:
+  void solve_dense();
+  void solve_sparse();
+
+  const JointRows& rows_;
+  MovingBodies& bodies_;
+  std::optional<SparseJointGradient> sparse_;
+  JointGradient gradient_;
+  Eigen::VectorXd size_of_row_, epsilon_, lambda_, a_;
+  Eigen::VectorXd gamma_, free_, right_, scratch_, change_;
+  Eigen::MatrixXd regular_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+
+/// Terms of a Jacobian at the state that is set.
+struct JacobianTerms {
+  const MovingBodies& bodies;
+  const JointRows& rows;
+  const Forces& forces;
+
+  /// Minus the derivatives of the forces and of G^T lambda to y and, from the column
+  /// `first_lambda` on, to lambda (< 0: none).
+  void add_motion(JacobianBlocks& J, const double* lambda, int first_lambda) const;
+  /// Derivatives of the order-th rate of g to y and, times cj, to the accelerations; rows without a
+  /// multiplier are 0 where `in_use` is given.
+  template <int order>
+  void add_rows(JacobianBlocks& J, int first_row, const RowsInUse* in_use, bool accelerations,
+                double cj) const;
+  /// Minus the derivatives of the power of all forces, by multipliers apart.
+  void add_power(JacobianBlocks& J) const;
+};
+
+/// With D = -d(f + G^T lambda)/dy and A = dg''/dy at fixed a and lambda:
+/// M da = G^T dlambda - D dy, G da = -A dy.
+class AccelerationJacobian {
+ public:
+  AccelerationJacobian(const JacobianTerms& terms, const ForwardDynamics& dynamics);
+
+  /// At the state that is set, with its multipliers, accelerations and turns.
+  void form();
+  const Eigen::MatrixXd& accelerations() const { return da_; }     ///< 6 a body x its unknowns
+  const Eigen::MatrixXd& multipliers() const { return dlambda_; }  ///< of each row
+
+ private:
+  void form_left();
+
+  const JacobianTerms& terms_;
+  const ForwardDynamics& dynamics_;
+  Eigen::MatrixXd left_, da_, dlambda_;
+  Entries entries_;
+  bool recorded_ = false;
+};
+
+}  // namespace tether::scene::smooth
