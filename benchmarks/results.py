@@ -49,6 +49,10 @@ COMMANDS = {
     "chain_cost": ("Long chains beside plain IDA",
                    "Plain IDA in two forms: algebraic variables in its error test, and suppressed as the projection has them.",
                    f"{BUILT}/projection/chain_cost --links 100,1000 --tolerances 1e-4,1e-6 --end 0.1 --repeats 1"),
+    "contact_ablation": ("What each stage and mechanism of the contact solver is worth",
+                         "Each row: that mechanism alone is off. Problems are generated, from one seed. Work is counted by the library and "
+                         "not timed; it is over that of the whole solver, of all solves and of those that both solve.",
+                         "python3 benchmarks/contact/ablation/ablation.py"),
     "contact_collection": ("Contact problems in files", "Time to a residual, beside the solvers of Siconos.",
                            f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA --law coulomb --time-limit 1"
                            " | grep -E 'natural_map  |^tolerance|^unsolved'"),

@@ -8,7 +8,7 @@
 # The same loop, z = a x + b y, is timed in SUNDIALS and in a program compiled for this purpose, in
 # turns of a microsecond or two, of which the fastest counts: that is one which nothing else on the
 # machine has interrupted. The ratio is 0.5 to 1.3 for optimised libraries and beyond 4 without; it
-# does not hang on the processor's speed or load.
+# does not depend on the processor's speed or load.
 function(_tether_measure_sundials)
   set(TETHER_SUNDIALS_OPTIMISED "" CACHE STRING "Is the SUNDIALS that was found optimised? (empty: unknown)")
   mark_as_advanced(TETHER_SUNDIALS_OPTIMISED)

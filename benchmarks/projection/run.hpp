@@ -13,7 +13,7 @@
 
 namespace tether::bench {
 
-/// Looks at every accepted step: time, unknowns (of the problem's form), order (0: not known).
+/// Called at every accepted step: time, unknowns (of the problem's form), order (0: not known).
 /// Runs that are watched are not timed.
 using Watch = std::function<void(double t, const double* y, int order)>;
 

@@ -93,7 +93,7 @@ int solve(Ida& ida, double end, double& t) {
   return IDASolve(ida.memory, end, &t, ida.y, ida.yp, IDA_NORMAL);
 }
 
-/// The same steps, looked at one by one.
+/// The same steps, recorded one by one.
 int solve(Ida& ida, double end, double& t, const Observer& observer) {
   int flag = IDA_SUCCESS;
   while (flag == IDA_SUCCESS && t < end) {

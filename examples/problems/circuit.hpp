@@ -31,9 +31,9 @@ S drain_current(const MosDevice& device, S drain_source, S gate_source, S bulk_s
   return (reverse ? -device.reverse_gain : device.gain) * square * (1.0 + kLength * along);
 }
 
-/// Transistors whose terminals hang on nodes by resistances, with capacitances of constant size at
-/// the gate and of junctions at the bulk. Voltages are listed as nodes, ground, supply, inputs; a
-/// terminal is an index into that list.
+/// Transistors whose terminals are connected to nodes by resistances, with capacitances of constant
+/// size at the gate and of junctions at the bulk. Voltages are listed as nodes, ground, supply,
+/// inputs; a terminal is an index into that list.
 struct Circuit {
   struct Transistor {
     MosDevice device;

@@ -11,7 +11,7 @@
 
 namespace tether::problems {
 
-/// A value and its derivatives along some directions; comparisons look at the value.
+/// A value and its derivatives along some directions; comparisons use the value.
 struct Dual {
   static constexpr int kDirections = 8;  // a sweep over these costs as much as two single ones
   double value = 0.0;

@@ -2,8 +2,8 @@
 //
 // Gift wrapping (Chand and Kapur, An algorithm for convex polytopes, J. ACM 17, 1970) by planes:
 // from each edge of a face to the plane that lies farthest about it. A face is the set of points
-// near its plane, a corner is a point of three faces or more: so nothing hangs on which of several
-// points in a plane, or on a line, comes first.
+// near its plane, a corner is a point of three faces or more: so nothing depends on which of
+// several points in a plane, or on a line, comes first.
 #include <tether/linalg/convex_hull.hpp>
 
 #include <Eigen/Geometry>

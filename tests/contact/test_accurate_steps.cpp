@@ -216,7 +216,7 @@ TEST_CASE("accurate steps: a ball bounces until it rests, at the times of the cl
   }
   CHECK(worst < 20 * accuracy * h);
   CHECK(std::abs(velocity(s, ball).z()) < 1e-9 * unit);
-  CHECK(s.counts().parts + s.counts().rejected < 3000 / std::sqrt(accuracy / 1e-3));
+  CHECK(s.counts().sub_steps + s.counts().rejected < 3000 / std::sqrt(accuracy / 1e-3));
   CHECK(s.counts().unsolved == 0);
 }
 
@@ -250,7 +250,7 @@ TEST_CASE("accurate steps: a block on a belt sticks, slips and comes back to the
   }
   CAPTURE(accuracy);
   CHECK(worst < 20 * accuracy);
-  CHECK(s.counts().parts < 500 / std::sqrt(accuracy / 1e-3));
+  CHECK(s.counts().sub_steps < 500 / std::sqrt(accuracy / 1e-3));
 }
 
 TEST_CASE("accurate steps: free tops keep momentum and energy; memory goes on with the same bits") {
@@ -350,7 +350,7 @@ TEST_CASE("accurate steps: a pendulum that turns by more than a radian in a step
   // As many sub-steps as 1 / sqrt(accuracy), each of which may err by the accuracy.
   CHECK((position(s, bob) - l * Vector3d(std::sin(angle), 0, -std::cos(angle))).norm() <
         2 * std::sqrt(accuracy));
-  CHECK(s.counts().parts < 2000 / std::sqrt(accuracy / 1e-3));
+  CHECK(s.counts().sub_steps < 2000 / std::sqrt(accuracy / 1e-3));
 }
 
 TEST_CASE("accurate steps: the shortest part is that of the step, whatever a memory says") {
@@ -367,6 +367,6 @@ TEST_CASE("accurate steps: the shortest part is that of the step, whatever a mem
     s.set_memory(memory);
     s.step();
     CHECK(s.time() == Approx(1e-2).epsilon(1e-14));
-    CHECK(s.counts().parts < 2002);
+    CHECK(s.counts().sub_steps < 2002);
   }
 }

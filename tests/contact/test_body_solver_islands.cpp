@@ -471,7 +471,7 @@ TEST_CASE("an island that is never solved: the best point is returned, not the l
     REQUIRE(one.status != Status::solved);
     CHECK(one.sweeps == sweeps);
     INFO(sweeps << " sweeps: " << one.error << ", least before " << least);
-    // Residuals are looked at where the change of a sweep has fallen by a fifth.
+    // Residuals are computed where the change of a sweep has fallen by a fifth.
     CHECK(one.error <= 1.25 * least);
     least = std::min(least, one.error);
     // Impulses, velocities and residual are of the same point.

@@ -54,7 +54,7 @@ TEST_CASE("cuts: a ball bounces along its parabolas at every step length") {
     const auto [z, v] = bounced(1, e, s.time());
     REQUIRE(std::abs(position(s, 1).z() - 0.1 - z) < 1e-11);
     REQUIRE(std::abs(velocity(s, 1).z() - v) < 1e-10);
-    REQUIRE(s.last_part() == dt);
+    REQUIRE(s.last_sub_step() == dt);
     REQUIRE(std::abs(velocity(s, 1).z() - (impulses / 2 - kGravity * s.time())) < 1e-10);
   }
   CHECK(s.counts().bounces == (e < 0.7 ? 3 : 1));

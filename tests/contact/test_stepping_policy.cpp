@@ -127,7 +127,7 @@ TEST_CASE("stepping: halves start from impulses of their length, and leave those
       const auto place = std::find(after.ids.begin(), after.ids.end(), s.contacts().points[c].id);
       REQUIRE(place != after.ids.end());
       const Vector3d& left = after.impulses[static_cast<std::size_t>(place - after.ids.begin())];
-      CHECK(left == step / s.last_part() * s.contacts().impulses[c]);
+      CHECK(left == step / s.last_sub_step() * s.contacts().impulses[c]);
     }
     // An attempt that fails is followed by one of half its length, which knows nothing of it.
     for (std::size_t a = 0; a + 1 < starts.size(); ++a) {

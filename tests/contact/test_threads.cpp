@@ -10,7 +10,7 @@ using namespace tether::contact::detail;
 
 // Sleepers are woken late and make the others sleep: below a wake-up's time spinning is cheaper.
 TEST_CASE("threads: waits are long, short after a wait in vain, and long again") {
-  Patience p;
+  SpinCounts p;
   const int patient = p.spins();
   p.slept();
   const int impatient = p.spins();
@@ -42,15 +42,15 @@ TEST_CASE("threads: nobody passes a meeting before all have come, awake or aslee
     std::atomic<int> come{0};
     std::atomic<int> early{0};
     auto work = [&](int thread) {
-      Patience patience;
+      SpinCounts spins;
       for (int round = 1; round <= 300; ++round) {
         // Later than anyone spins, now and then.
         if (round % 100 == 0 && thread == round / 100 % threads)
           std::this_thread::sleep_for(std::chrono::milliseconds(2));
         ++come;
-        team.barrier.wait(patience);
+        team.barrier.wait(spins);
         early += come.load() < threads * round;
-        team.barrier.wait(patience);
+        team.barrier.wait(spins);
       }
     };
     team.run(threads, work);

@@ -20,7 +20,7 @@ int pendulum_residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* 
   return 0;
 }
 
-/// x' = y' = 0: a point that stays, to look at projections alone.
+/// x' = y' = 0: a point that stays, for projections alone.
 Problem still(std::vector<double> y0) {
   return ode(std::move(y0), 1.0,
              [n = y0.size()](double, const double*, double* f) { std::fill(f, f + n, 0.0); });

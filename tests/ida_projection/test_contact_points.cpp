@@ -1,4 +1,4 @@
-// Tether: rows that hang on algebraic variables which equations of F determine.
+// Tether: rows that contain algebraic variables which equations of F determine.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
@@ -178,7 +178,7 @@ TEST_CASE("rows that repeat an equation of F are solved for its algebraic variab
 
 TEST_CASE(
     "a start off the contact, contact point included: consistent from the gap alone, or both") {
-  // Rows hang on the contact point, which F determines: they are solved together with F.
+  // Rows contain the contact point, which F determines: they are solved together with F.
   const auto residual = [](sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void* data) {
     static_cast<const Problem*>(data)->residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp),
                                                 N_VGetArrayPointer(r));

@@ -126,7 +126,7 @@ TEST_CASE("many redundant sparse rows: their factors raise no doubt about C") {
   const Problem problem = Many::problem(4.0);
   const Run run = integrate(problem, 1e-6, as_sparse(Many::distances(), problem.size), {}, false);
   REQUIRE(run.flag >= 0);
-  // Forty looks at whether F keeps a row, of twelve evaluations each.
+  // Forty checks whether F keeps a row, of twelve evaluations each.
   CHECK(run.statistics.value_evaluations <= run.statistics.iterations + 40 * 12);
   CHECK(run.message.empty());
 }

@@ -238,7 +238,7 @@ TEST_CASE("messages and counts are the same in a host whose numbers have a comma
 TEST_CASE("polish = none: no residual is evaluated beside IDA's") {
   tp::Options options;
   options.advanced.polish = tp::Polished::none;
-  options.advanced.smooth_where_needed = false;  // it looks at F once
+  options.advanced.smooth_where_needed = false;  // it evaluates F once
   Host host(tether::test::circle(5.0), 1e-6);
   options.id = host.vector({1.0, 1.0});
   host.attach(on_circle(), options);
@@ -277,7 +277,7 @@ TEST_CASE("tolerance: what is asked for is what is left") {
     const Run run = integrate(problem, 1e-5, rows, options);
     INFO("tolerance " << tolerance);
     REQUIRE(run.flag >= 0);
-    CHECK(run.distance <= std::max(tolerance, 1e-6));  // looked at now and then, not at every step
+    CHECK(run.distance <= std::max(tolerance, 1e-6));  // checked now and then, not at every step
   }
 }
 

@@ -43,7 +43,7 @@ TEST_CASE("rows and columns of a wider array: the same bits as the rows by thems
       INFO(label(m, n) << ", gap " << gap);
       const Case c = random_case(m, n, 7);
       const int width = gap * n + 3;
-      RowMajor wide = RowMajor::Constant(2 * m, width, 1e30);  // must not be looked at
+      RowMajor wide = RowMajor::Constant(2 * m, width, 1e30);  // must not be read
       std::vector<int> rows, columns;
       for (int i = 0; i < m; ++i) rows.push_back(2 * (m - 1 - i));
       for (int j = 0; j < n; ++j) columns.push_back(2 + gap * j);
@@ -415,7 +415,7 @@ TEST_CASE("few rows known to be independent: as factored anew, every size, until
       std::mt19937 random(static_cast<unsigned>(40 * m + n));
       Case c = random_case(m, n, static_cast<unsigned>(100 * m + n));
       c.D = c.D.array().pow(0.2);
-      // Every second row and column of a wider array; what is between must not be looked at.
+      // Every second row and column of a wider array; what is between must not be read.
       const int width = 2 * n + 1;
       std::vector<int> rows, columns;
       for (int i = 0; i < m; ++i) rows.push_back(2 * (m - 1 - i));

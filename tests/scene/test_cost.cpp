@@ -69,7 +69,7 @@ void check_wanted(const std::string& text, const ClosedForm& truth, std::size_t 
         true_error(scene.stepping ? scene : costs::with_setting(scene, row.method, row.setting),
                    row.setting, truth);
     INFO("step " << row.setting << ": said " << row.error << ", true " << error);
-    CHECK(error <= 1.0001 * row.error);  // it was looked at where each step ends
+    CHECK(error <= 1.0001 * row.error);  // it was measured where each step ends
   }
 }
 

@@ -259,7 +259,7 @@ TEST_CASE("long texts of a repetition count as what they are, and braces end whe
       parse_scene("[[body]]\n" + std::string(long_text, 'k') + " = 1\nrepeat = { count = 4000 }\n",
                   "long.toml"),
       Catch::Contains("numbers and texts"));
-  // Two million openings before one end: each of them looked at all that follows.
+  // Two million openings before one end: each of them searched all that follows.
   CHECK_THROWS_WITH(parse_scene(repeated(std::string(2000000, '{') + "}", 1), "braces.toml"),
                     Catch::Contains("at most 1000 bytes"));
   CHECK(parse_scene(repeated("{{i}}{i+123456}{i+1234567}{}", 1), "braces.toml").bodies[0].name ==

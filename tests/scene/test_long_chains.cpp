@@ -36,7 +36,7 @@ Scene chains(int links, int chains, double tolerance) {
 }
 
 /// n x n balls on a curved surface, on rods along the lattice and, if `braced`, both diagonals of
-/// its cells; two corners hang on the world. Lengths in units of `unit`.
+/// its cells; two corners are joined to the world. Lengths in units of `unit`.
 Scene net(int n, bool braced, double tolerance, double unit = 1) {
   Scene s = scene(tolerance);
   s.gravity = Vector3d(0, 0, -kGravity * unit);

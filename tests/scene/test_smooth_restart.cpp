@@ -66,7 +66,7 @@ TEST_CASE("a saved smooth state with positions or velocities that are no numbers
       }
 }
 
-// A run looks at times within a step and ends at the end of that step; the steps of a restored one
+// A run has outputs within a step and ends at the end of that step; the steps of a restored one
 // are asked for that end alone.
 TEST_CASE("a run that ends with the step that it has just looked into is restored with its bits",
           "[smooth]") {

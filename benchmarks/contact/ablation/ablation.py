@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """What each stage and mechanism of the contact solver is worth. SPDX-License-Identifier: BSD-3-Clause
 
-    ablation.py [--seeds 1,2] [--output contact_ablation.md] [FOLDER ...]
+    ablation.py [--seeds 1] [FOLDER ...]      # prints the table; results.py contact_ablation keeps it
+    ablation.py --check                       # has every mechanism its place in the sources?
 
-Builds a copy of the tree in build/ablation where each mechanism of mechanisms.txt has a switch, solves all
-problems of the folders and generated ones with each switched off, and writes the table: problems lost and
-won, work over that of the whole solver by the library's own count.
+Builds a copy of the tree in build/ablation where each mechanism of mechanisms.txt has a switch, and solves all
+problems of the folders and generated ones with each switched off. The table has the problems lost and won, and the
+work over that of the whole solver by the library's own count. Each further seed adds as many problems again.
 """
 import argparse
 import concurrent.futures
@@ -14,6 +15,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(HERE)))
@@ -42,6 +44,15 @@ def text_of(words):
     return r"\s*".join(re.escape(token) for token in re.findall(r"\w+|[^\w\s]", words))
 
 
+def misplaced(root):
+    """Mechanisms whose text does not stand in its file exactly once."""
+    for m in mechanisms():
+        path = os.path.join(root, "contact", "src", "assembled", m["file"])
+        found = len(re.findall(text_of(m["-"]), open(path, encoding="utf-8").read())) if os.path.isfile(path) else 0
+        if found != 1:
+            yield f"{m['name']}: its text is there {found} times in {m['file']}"
+
+
 def build(all_mechanisms):
     for name in subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).split("\n"):
         source, copy = os.path.join(ROOT, name), os.path.join(TREE, name)
@@ -52,9 +63,7 @@ def build(all_mechanisms):
         path = os.path.join(TREE, "contact", "src", "assembled", m["file"])
         source = open(path, encoding="utf-8").read()
         new = m["+"].replace("OFF", f"TETHER_ABLATION_OFF({k})")
-        source, found = re.subn(text_of(m["-"]), lambda _: new, source)
-        if found != 1:
-            raise SystemExit(f"{m['name']}: its text is there {found} times in {m['file']}")
+        source = re.sub(text_of(m["-"]), lambda _: new, source)
         open(path, "w", encoding="utf-8").write(source if source.startswith(SWITCH) else SWITCH + source)
     subprocess.check_call(["cmake", "--preset", "release", "-DTETHER_BUILD_TESTS=OFF"], cwd=TREE,
                           stdout=subprocess.DEVNULL)
@@ -86,23 +95,21 @@ def row(name, base, off):
 
 parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
 parser.add_argument("folders", nargs="*", help="folders of .dat and .hdf5 files")
-parser.add_argument("--seeds", default="1,2", help="of generated problems")
-parser.add_argument("--output", default=os.path.join(ROOT, "benchmarks", "results", "contact_ablation.md"))
+parser.add_argument("--seeds", default="1", help="of generated problems, with commas between")
+parser.add_argument("--check", action="store_true", help="only checks that every mechanism has its place")
 args = parser.parse_args()
 
+problems = list(misplaced(ROOT))
+print("\n".join(problems), file=sys.stderr, end="\n" if problems else "")
+if args.check or problems:
+    sys.exit(1 if problems else 0)
 listed = mechanisms()
 build(listed)
 with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
     base, *without = pool.map(solve, range(len(listed) + 1))
-commit = subprocess.check_output(["git", "log", "-1", "--format=%h (%cs)"], cwd=ROOT, text=True).strip()
-with open(args.output, "w", encoding="utf-8") as table:
-    solved = sum(status == "solved" for status, _ in base.values())
-    table.write("# What each stage and mechanism of the contact solver is worth\n\n"
-                f"- Command: `benchmarks/contact/ablation/ablation.py --seeds {args.seeds} {' '.join(args.folders)}`\n"
-                f"- Commit: {commit}\n- Machine: any; work is counted, not timed\n\n"
-                f"{len(base)} solves at 1e-3, 1e-6 and 1e-9 under two laws, {solved} of them solved with at most 2e8 of "
-                f"work, {sum(w for _, w in base.values()):.3g} together. Each row: that mechanism alone is off. Work is "
-                "over that of the whole solver, by the library's own count: of all solves, and of those that both solve."
-                "\n\n| off | lost | won | work | work, solved by both | lost of |\n|---|---|---|---|---|---|\n")
-    for m, off in zip(listed, without):
-        table.write(row(m["name"], base, off) + "\n")
+solved = sum(status == "solved" for status, _ in base.values())
+print(f"{len(base)} solves at 1e-3, 1e-6 and 1e-9 under two laws; the whole solver solves {solved} of them with at most 2e8 of work "
+      f"each, {sum(w for _, w in base.values()):.3g} together.\n\n"
+      "| off | lost | won | work | work, solved by both | lost of |\n|---|---|---|---|---|---|")
+for m, off in zip(listed, without):
+    print(row(m["name"], base, off))

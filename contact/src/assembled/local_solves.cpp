@@ -40,7 +40,7 @@ bool LocalSolves::find_errors(Search& search, const Packed& x) {
   return most_ > 0 && std::isfinite(most_);
 }
 
-// The contacts that hang together with `seed` by reached ones, unless they are too many.
+// The contacts that are connected with `seed` through reached ones, unless they are too many.
 void LocalSolves::add_part(const Problem& p, int seed, int largest) {
   if (place_[at(seed)] != reached_only) return;
   const std::size_t first = list_.size();

@@ -27,10 +27,10 @@ struct Team {
   PassScratch* scratch;
   int passes = 0;                     // so far: the same number for each thread of a team
   SweepPartners* partners = nullptr;  // other processes that sweep the same island
-  mutable Patience patience = {};     // of this thread
+  mutable SpinCounts spins = {};      // of this thread
 
   void meet() const {
-    if (threads > 1) barrier->wait(patience);
+    if (threads > 1) barrier->wait(spins);
   }
   // Work that the first thread does for all.
   template <class Work>

@@ -13,7 +13,7 @@ namespace tether::contact::detail {
 // later, late for the next meeting, where the other one sleeps then: where all have a core,
 // spinning for longer than that is the cheaper way to wait. Where others have taken the core it
 // waits for nothing: a wait in vain is followed by short ones, twice as many each time.
-class Patience {
+class SpinCounts {
  public:
   int spins() const { return short_waits_ > 0 ? kShort : kLong; }
   void met() {
@@ -42,7 +42,7 @@ class Patience {
 class Barrier {
  public:
   void reset(int threads) { threads_ = threads; }
-  void wait(Patience& patience) {
+  void wait(SpinCounts& spins) {
     if (threads_ == 1) return;
     const int round = round_.load();
     if (come_.fetch_add(1) + 1 == threads_) {
@@ -51,16 +51,16 @@ class Barrier {
       if (sleepers_.load() > 0) wake();
       return;
     }
-    for (int left = patience.spins(); left > 0; --left) {
+    for (int left = spins.spins(); left > 0; --left) {
       if (round_.load(std::memory_order_acquire) != round) {
-        patience.met();
+        spins.met();
         return;
       }
 #if defined(__x86_64__) || defined(__i386__)
       __builtin_ia32_pause();
 #endif
     }
-    patience.slept();
+    spins.slept();
     sleep(round);
   }
 

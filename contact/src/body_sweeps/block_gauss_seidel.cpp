@@ -12,14 +12,14 @@ namespace tether::contact {
 
 namespace {
 
-constexpr double kSlow = 15;  // sweeps forecast, from which on they have momentum
-// An assembled problem is tried after sweeps for kTried of its price, where they are forecast to
-// cost kDearer times that, with work for kRuns of it: walls need up to three. An attempt that
-// begins anew repeats what the one before has done, so each has as much as all before and that
-// again, once sweeps have done as much as they.
-constexpr double kTried = 0.15, kDearer = 1.25, kRuns = 4;
+constexpr double kSlow = 15;  // with more sweeps forecast they get momentum
+// The assembled problem of an island is tried once sweeps have cost kTried of its price, if further
+// sweeps are forecast to cost more than kMoreExpensive times that price. Its work is bounded by
+// kRuns times the price, which walls nearly need. A later attempt repeats the work of the one
+// before, so it gets as much more as all attempts together, once sweeps have done as much as they.
+constexpr double kTried = 0.15, kMoreExpensive = 1.25, kRuns = 4;
 constexpr int kFew = 64;        // see BodyOptions::min_sweeps
-constexpr double kShare = 0.1;  // of the tolerance, that round-off of the start may be
+constexpr double kShare = 0.1;  // of the tolerance: allowed round-off of the start
 
 }  // namespace
 
@@ -137,7 +137,7 @@ struct BodySolver::Implementation::Iteration {
   double assembly(double more) {
     if (!momentum.on() || !permitted()) return 0;
     const double once = price.sweeps(), spent = r.spent / price.sweep();
-    if (r.sweeps < std::max(kTried * once, spent) || more < kDearer * once) return 0;
+    if (r.sweeps < std::max(kTried * once, spent) || more < kMoreExpensive * once) return 0;
     return std::min(solver.options.max_work, (spent + kRuns * once) * price.sweep());
   }
 

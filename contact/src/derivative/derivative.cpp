@@ -119,7 +119,7 @@ struct detail::DerivativeParts {
     for (int& contact : report.not_unique) contact = embedding->block_of(contact);
   }
   void check(const ProblemDirection& direction) const;
-  // The contact whose own block has an entry of A, under a law that looks at it; -1: none.
+  // The contact whose own block has an entry of A, under a law that uses that block; -1: none.
   int own_block(const MatrixEntry& e) const {
     const int d = contacts.problem().dimension();
     return !embedding && e.row / d == e.column / d ? e.row / d : -1;

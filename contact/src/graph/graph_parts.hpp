@@ -67,7 +67,7 @@ class Adjacency {
 
  private:
   std::vector<int> start_, all_;
-  std::vector<int> between_;  // body -> contacts with the body looked at
+  std::vector<int> between_;  // body -> contacts with the present body
   std::vector<float> count_;  // contact -> coupled
 };
 

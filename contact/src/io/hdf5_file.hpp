@@ -72,8 +72,8 @@ std::size_t believable_count(hid_t file, hid_t set, const std::string& full) {
   return static_cast<std::size_t>(count);
 }
 
-// A file may lead to others by links, by storage that lies outside and by virtual data; and name
-// filters, which HDF5 would load as code, or the same one twice, which may expand without a bound.
+// A file may refer to other files by links, external storage and virtual data. It may name filters,
+// which HDF5 would load as code, or the same filter twice, which may expand without bound.
 inline herr_t no_other_file(const char*, const char*, const char*, const char*, unsigned*, hid_t,
                             void*) {
   return -1;

@@ -341,7 +341,7 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
     accept(time, length, off, smooth, cut);
     break;
   }
-  ++stepper_.counts.parts;
+  ++stepper_.counts.sub_steps;
   return length;
 }
 

@@ -87,7 +87,7 @@ const std::vector<double>& Stepper::law_impulses() const {
   const auto& joints = implementation_->steps.joints;
   return joints ? joints->law_impulses() : none;
 }
-double Stepper::last_part() const { return implementation_->steps.now.length; }
+double Stepper::last_sub_step() const { return implementation_->steps.now.length; }
 int Stepper::asleep() const {
   const auto& sleeping = implementation_->steps.sleeping;
   return sleeping ? sleeping->count() : 0;

@@ -1,4 +1,4 @@
-// Tether: what becomes of moves to which stiff components answer. SPDX-License-Identifier:
+// Tether: the metric of moves to which stiff components respond. SPDX-License-Identifier:
 // BSD-3-Clause
 #include "attach/impl.hpp"
 #include "host/mechanisms.hpp"

@@ -51,7 +51,7 @@ struct Projection::Impl::Inquiry {
   N_Vector y = nullptr;  // moved on success, where rows contain algebraic variables of F
   const std::vector<bool>& hold;
   ConsistencyReport report;  // of that move
-  bool answered = false;
+  bool probed = false;
 };
 
 // Error weights, algebraic variables, and the move by rows that are solved together with equations
@@ -67,25 +67,25 @@ int Projection::Impl::answer_inquiry(Candidate& candidate) {
                   unknowns_.weights, inquiry_->report);
   }
   movers_.joined.forget();
-  inquiry_->answered = true;
+  inquiry_->probed = true;
   return 0;
 }
 
-// Lets IDA attempt a step in which the decorated solver answers the inquiry and returns no
+// Lets IDA attempt a step in which the decorated solver starts the inquiry and returns no
 // correction. IDA must be reinitialised afterwards.
 void Projection::Impl::probe(double t0, N_Vector yy, N_Vector yp, Inquiry& inquiry) {
   const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
   const double tiny = 1e-8 * std::max(1.0, std::abs(t0));
-  const auto answers = [&](double tout) {
+  const auto starts = [&](double tout) {
     sunrealtype reached = t0;
     const int flag = IDASolve(ida_.mem(), tout, &reached, y, ydot, IDA_ONE_STEP);
-    return inquiry.answered || flag != IDA_ILL_INPUT;
+    return inquiry.probed || flag != IDA_ILL_INPUT;
   };
   inquiry_ = &inquiry;
   // IDA refuses a step beyond a stop time, which may lie on one side of t0 or at t0.
-  if (!answers(t0 + tiny) && !answers(t0 - tiny)) {
+  if (!starts(t0 + tiny) && !starts(t0 - tiny)) {
     IDASetStopTime(ida_.mem(), t0 + 2.0 * tiny);
-    answers(t0 + tiny);
+    starts(t0 + tiny);
     IDAReInit(ida_.mem(), t0, yy, yp);
     IDASetStopTime(ida_.mem(), t0);
   }
@@ -126,9 +126,9 @@ ConsistencyReport Projection::Impl::project_start(double t0, N_Vector y, N_Vecto
                                                   const Consistency& how, bool* jointly) {
   Inquiry joint{t0, y, how.hold, {}, false};
   if (IDAReInit(ida_.mem(), t0, y, ydot) == 0) probe(t0, y, ydot, joint);
-  const bool answered = joint.answered && !run_.broken;
-  if (!answered && run_.broken) throw NoStart{report_.status, report_.message};
-  if (!answered)
+  const bool probed = joint.probed && !run_.broken;
+  if (!probed && run_.broken) throw NoStart{report_.status, report_.message};
+  if (!probed)
     throw NoStart{Status::internal_error,
                   "IDA could not be started at the given values; set tolerances and the linear "
                   "solver before make_consistent, and look at IDA's own message"};
@@ -282,7 +282,7 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
   // A point at the end of a step is projected already, an interpolated one is not.
   const Status of_step = report_.status;
   const std::string text = report_.message;
-  if (!answer("solve", {}, [&] { return project(*tret, yret, ypret); })) return flag;
+  if (!report_of("solve", {}, [&] { return project(*tret, yret, ypret); })) return flag;
   report_.status = of_step;
   report_.message = text;
   return flag;

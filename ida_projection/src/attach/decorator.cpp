@@ -80,9 +80,9 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   corrector_.begin(mem);
   if (movers_.used != nullptr) movers_.used->rows().forget_failure();
   control_.restore_weights(weights, attempts_.steps);
-  const bool asked = inquiry_ != nullptr;
-  int flag = asked ? answer_inquiry(candidate) : step(candidate, tolerance, call_setup);
-  if (flag == 0 && !asked) choose_step(candidate);
+  const bool probes = inquiry_ != nullptr;
+  int flag = probes ? answer_inquiry(candidate) : step(candidate, tolerance, call_setup);
+  if (flag == 0 && !probes) choose_step(candidate);
   // A failed evaluation of the plugin's own does no harm, but a fatal flag ends the run.
   const bool ended =
       corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().fatal());
@@ -164,10 +164,10 @@ int Projection::Impl::step(Candidate& candidate, double tolerance, bool call_set
   account(move, step);
   if (move.status == Status::success) {
     check_start(move);
-    check_for_doubts(candidate, step);
+    check_rows(candidate, step);
   }
-  // Moves that do not converge: a wrong C as a rule. Looked into where it is to be said.
-  if (move.status == Status::not_converged && report_.says_failures(attempts_.steps))
+  // If moves do not converge C is wrong, as a rule. The cause is diagnosed only if it is printed.
+  if (move.status == Status::not_converged && report_.prints_failures(attempts_.steps))
     return finish(move.status,
                   movers_.used->message() +
                       watch_.rejections.suspicion(candidate, corrector_, attempts_.steps));
@@ -267,7 +267,7 @@ void Projection::Impl::account_for_previous_attempt(const StepData& step) {
 
 void Projection::Impl::account(const Move& move, const StepData& step) {
   Statistics& s = statistics_;
-  ++(move.looked ? s.skipped : s.projections);
+  ++(move.not_needed ? s.skipped : s.projections);
   if (move.capped) ++s.moves_capped;
   if (move.status != Status::success) return;
   s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);

@@ -31,8 +31,8 @@ void Projection::Impl::check_start(const Move& move) {
                    " tolerances off the constraints; call make_consistent first");
 }
 
-void Projection::Impl::check_for_doubts(const Candidate& candidate, const StepData& step) {
-  if (!FirstSteps::looks(attempts_.steps) || attempts_.repeated ||
+void Projection::Impl::check_rows(const Candidate& candidate, const StepData& step) {
+  if (!FirstSteps::are_checked(attempts_.steps) || attempts_.repeated ||
       report_.warning() != Status::success || !in_use(Mechanism::false_row_watch))
     return;
   const std::string doubt =

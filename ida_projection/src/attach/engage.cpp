@@ -1,4 +1,4 @@
-// Tether: how moves begin in a run, and what is looked at for that. SPDX-License-Identifier:
+// Tether: how moves begin in a run. SPDX-License-Identifier:
 // BSD-3-Clause
 #include <algorithm>
 #include <cmath>
@@ -13,9 +13,9 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Setpoint for multipliers of index 2 (method, section 7), see care_of_high_index().
-constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kMostCare = 5.0,
-                 kManyFree = 0.4;
+// Setpoint for multipliers of index 2 (method, section 7), see setpoint_of_high_index().
+constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4,
+                 kLargestFactor = 5.0, kManyFree = 0.4;
 constexpr int kFew = 16;               // unknowns per row from which on rows are few
 constexpr double kNeedsNoMove = 1e-8;  // tolerances: a shorter first move does not begin the policy
 
@@ -29,9 +29,8 @@ bool Projection::Impl::rows_of_field() const {
   return gradients || kFew * constraints_.total_count() <= N_VGetLength(unknowns_.weights);
 }
 
-// There is no getter for the type of IDA's linear solver, but direct ones count no iterations and
-// iterative ones, with a Jacobian of their own or without, do from the first right-hand side that
-// is not zero.
+// No getter tells the type of IDA's linear solver. Only iterative solvers count iterations, from
+// the first nonzero right-hand side on.
 void Projection::Impl::find_linear_solver_kind() {
   long iterations = 0, preconditioners = 0, jacobians = 0;
   IDAGetNumLinIters(ida_.mem(), &iterations);
@@ -101,14 +100,14 @@ void Projection::Impl::begin_run(const Candidate& candidate) {
 // makes them follow the tolerance. Where rows leave few directions free the projection removes most
 // of the error, and s keeps its usual value. Runs at loose tolerances are short and of low order,
 // where s is halved.
-Care Projection::Impl::care_of_high_index(const Candidate& candidate) const {
+SetpointFactors Projection::Impl::setpoint_of_high_index(const Candidate& candidate) const {
   const N_Vector id = variables_.id();
-  const Care usual{kAsideFromTest, kAsideFromTest};
+  const SetpointFactors usual{kAsideFromTest, kAsideFromTest};
   if (!in_use(Mechanism::care) || variables_.undetermined().empty()) return usual;
   const double differential = N_VDotProd(id, id);
   if (constraints_.total_count() > (1.0 - kManyFree) * differential) return usual;
   const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
-  const double tighter = std::clamp(std::pow(kProportional * unknowns, 0.2), 1.0, kMostCare);
+  const double tighter = std::clamp(std::pow(kProportional * unknowns, 0.2), 1.0, kLargestFactor);
   return {kAsideFromTest * tighter, kAtLowOrders * tighter * tighter};
 }
 
@@ -157,7 +156,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   const std::string doubts = given ? variables_.doubts(candidate, corrector_, cj) : std::string();
   if (!doubts.empty()) report_.warn(Status::doubtful, doubts);
   if (variables_.high_index()) {
-    control_.begin_smoothing(care_of_high_index(candidate));
+    control_.begin_smoothing(setpoint_of_high_index(candidate));
     const std::string found = run_.start ? undetermined_at(candidate, run_.start) : std::string();
     if (!found.empty() && doubts.empty()) {
       run_.undetermined = "the motion from the start is not determined: there " + found;

@@ -82,8 +82,8 @@ class Projection::Impl {
 
   /// Runs a call of the host, or refuses it with a report where it cannot be served.
   template <class Call>
-  ConsistencyReport answer(const char* function, std::initializer_list<N_Vector> vectors,
-                           Call call) {
+  ConsistencyReport report_of(const char* function, std::initializer_list<N_Vector> vectors,
+                              Call call) {
     ConsistencyReport report;
     report.message = why_misused(function, vectors);
     report.status = Status::misused;
@@ -154,7 +154,7 @@ class Projection::Impl {
   void leave_out_of_error_test(bool coupled);  ///< `coupled`: variables of index 1 stay in it
   void test_all_again();
   std::optional<int> engage_in_trouble(const Candidate& candidate);
-  Care care_of_high_index(const Candidate& candidate) const;
+  SetpointFactors setpoint_of_high_index(const Candidate& candidate) const;
   void begin_run(const Candidate& candidate);
   void quicken_vectors(const Candidate& candidate);
   std::optional<int> measure_before_engaging(const Candidate& candidate);
@@ -162,7 +162,7 @@ class Projection::Impl {
 
   // doubts.cpp
   void check_start(const Move& move);
-  void check_for_doubts(const Candidate& candidate, const StepData& step);
+  void check_rows(const Candidate& candidate, const StepData& step);
   void keep_point_before(const Candidate& candidate, OwnedVector& y);
   std::string undetermined_at(const Candidate& candidate, N_Vector y);
   std::string too_high_index() const;

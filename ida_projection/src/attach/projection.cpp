@@ -104,7 +104,7 @@ Projection::Impl::~Impl() {
 
 Status Projection::Impl::status() {
   check_for_bypass();
-  return watch_.bypass.steps() > 0 ? Status::never_called : report_.told();
+  return watch_.bypass.steps() > 0 ? Status::never_called : report_.status_or_warning();
 }
 
 const std::string& Projection::Impl::message() {
@@ -160,12 +160,12 @@ Projection& Projection::operator=(Projection&&) noexcept = default;
 
 ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector yp,
                                               const Consistency& how) {
-  return impl_->answer("make_consistent", {yy, yp},
-                       [&] { return impl_->make_consistent(t0, yy, yp, how); });
+  return impl_->report_of("make_consistent", {yy, yp},
+                          [&] { return impl_->make_consistent(t0, yy, yp, how); });
 }
 
 ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
-  return impl_->answer("project", {yy, yp}, [&] { return impl_->project(t, yy, yp); });
+  return impl_->report_of("project", {yy, yp}, [&] { return impl_->project(t, yy, yp); });
 }
 int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
   return impl_->solve_and_project(tout, tret, yret, ypret, itask);

@@ -19,7 +19,7 @@ struct tether_constraints {
 };
 
 struct tether_projection {
-  mutable ip::Projection projection;  // its getters look at IDA, too
+  mutable ip::Projection projection;  // its getters call IDA, too
   mutable std::string table;
 };
 
@@ -91,7 +91,7 @@ int finish(const ip::ConsistencyReport& found, tether_report* report) {
                                             : static_cast<int>(found.status);
 }
 
-// A call that answers with a report.
+// A call that returns a report.
 template <class Call>
 int reported(const tether_projection* projection, const char* function, tether_report* report,
              Call&& call) {

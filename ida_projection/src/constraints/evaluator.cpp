@@ -127,13 +127,13 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
   const Part* at = nullptr;
   const int flag = guarded(
       [&] {
-        int told = 0;
+        int flag = 0;
         for (const Part& part : parts_) {
           at = &part;
-          told = value_of(part, t, y, n, g + part.first_row);
-          if (told != 0) break;
+          flag = value_of(part, t, y, n, g + part.first_row);
+          if (flag != 0) break;
         }
-        return told;
+        return flag;
       },
       thrown_);
   return flag == 0 ? finite(t, g) : checked(flag, "value", *at);
@@ -155,8 +155,8 @@ int Evaluator::rows_of(const Part& part, double t, const double* y, int n, const
   const bool both = g != nullptr && part.gives_both;
   if (g != nullptr && !both) {
     *what = "value";
-    const int told = value_of(part, t, y, n, g);
-    if (told != 0) return told;
+    const int flag = value_of(part, t, y, n, g);
+    if (flag != 0) return flag;
   }
   if (part.dense == nullptr && part.sparse == nullptr) {
     *what = "value (differences)";
@@ -188,14 +188,14 @@ Status Evaluator::all_rows(double t, const double* y, int n, const double* scale
   const char* what = "";
   const int flag = guarded(
       [&] {
-        int told = 0;
+        int flag = 0;
         for (const Part& part : parts_) {
           at = &part;
-          told = rows_of(part, t, y, n, scale, columns, place(part),
+          flag = rows_of(part, t, y, n, scale, columns, place(part),
                          g != nullptr ? g + part.first_row : nullptr, &what);
-          if (told != 0) break;
+          if (flag != 0) break;
         }
-        return told;
+        return flag;
       },
       thrown_);
   if (flag != 0) return checked(flag, what, *at);
@@ -265,8 +265,8 @@ int Evaluator::differences(const Part& part, double t, const double* y, int n, c
     if (scale[j] > 0.0) relative = std::max(relative, std::abs(y[j]) / scale[j]);
   }
   y_shifted_.assign(y, y + n);
-  int told = evaluate(y, g_base_.data());
-  for (std::size_t k = 0; k < columns.size() && told == 0; ++k) {
+  int flag = evaluate(y, g_base_.data());
+  for (std::size_t k = 0; k < columns.size() && flag == 0; ++k) {
     const auto j = static_cast<std::size_t>(columns[k]);
     // About one tolerance, or sqrt(eps) atol / rtol: where y_j passes zero a smaller increment
     // would be lost in the rounding of g.
@@ -275,14 +275,14 @@ int Evaluator::differences(const Part& part, double t, const double* y, int n, c
     if (increment == 0.0) increment = kRootEpsilon;
     y_shifted_[j] = y[j] + increment;
     increment = y_shifted_[j] - y[j];  // the increment after rounding
-    told = evaluate(y_shifted_.data(), g_shifted_.data());
+    flag = evaluate(y_shifted_.data(), g_shifted_.data());
     y_shifted_[j] = y[j];
     for (int i = 0; i < m; ++i)
       C[static_cast<std::size_t>(i) * static_cast<std::size_t>(n) + j] =
           (g_shifted_[static_cast<std::size_t>(i)] - g_base_[static_cast<std::size_t>(i)]) /
           increment;
   }
-  return told;
+  return flag;
 }
 
 void Evaluator::sensitive(double t, const double* y, int n, const double* scale,

@@ -132,7 +132,7 @@ class Evaluator {
   }
   Status not_finite(double t, const double* g);
   /// A callback that writes g, C (`entries` of it) or both, with room behind them for what it
-  /// writes too much, which ends the run. C, whose copy would cost, is looked at the first time.
+  /// writes too much, which ends the run. C, whose copy would cost, is checked the first time.
   template <class Fill>
   int write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries, Fill&& fill);
   // Calls the callbacks of one set; g and C are written to the places of the set.

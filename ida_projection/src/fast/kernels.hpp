@@ -20,10 +20,9 @@ void install_kernels(N_Vector_Ops ops, sunindextype length, bool spreading);
 
 /// Gives serial vectors of one length the kernels of fast_vector(), which have the bits of what
 /// they replace. A vector of another kind, or with an operation that SUNDIALS did not put there (a
-/// program may count or change them), stays as it is; so do null pointers. `with_inputs`: also all
-/// that is combined, scaled or inverted into one of them from now on: IDA's history, of which its
-/// predictions are made; tolerances, of which its weights are; what a linear solver returns, of
-/// which corrections are.
+/// program may count or change them), stays as it is; so do null pointers. `with_inputs`: so do all
+/// vectors that are combined, scaled or inverted into one of them from now on. These are IDA's
+/// history, from which it predicts, its tolerances, and the solutions of its linear solver.
 void quicken(std::initializer_list<N_Vector> vectors, bool with_inputs);
 
 }  // namespace tether::ida_projection::fast

@@ -116,7 +116,7 @@ bool Mover::needs_no_move_again(const Candidate& candidate, Move& result) {
   if (!in_use(Mechanism::looks) || nothing_in_row_ < kUnneededMoves) return false;
   result.status = rows_->value(candidate.t, false);
   if (result.status != Status::success) return true;
-  result.looked = still_ = clearly_needs_no_move();
+  result.not_needed = still_ = clearly_needs_no_move();
   if (!still_) return false;
   result.drift_before = result.drift_after = rows_->drift();
   move_length_ = 0.0;

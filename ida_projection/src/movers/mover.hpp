@@ -23,7 +23,7 @@ struct Move {
   double drift_after = 0.0;   ///< the same where g was evaluated last; see remaining_drift()
   int moves = 0;              ///< Newton moves made
   double floor = 0.0;         ///< measure(): length that rounding of y alone explains
-  bool looked = false;        ///< no move was needed, which g and earlier factors have shown
+  bool not_needed = false;    ///< no move was needed, which g and earlier factors have shown
   bool capped = false;
   double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };

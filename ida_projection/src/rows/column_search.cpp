@@ -41,8 +41,8 @@ ColumnSearch::Outcome ColumnSearch::probe_alone(Group& group) {
   columns_.clear();
   change(group);
   changed_.assign(at(m_), 0);
-  const bool answered = probe_(columns_, changed_);
-  if (!answered) return group.end - group.begin > 1 ? Outcome::found : Outcome::refused;
+  const bool evaluated = probe_(columns_, changed_);
+  if (!evaluated) return group.end - group.begin > 1 ? Outcome::found : Outcome::refused;
   group.rows.clear();
   for (int i = 0; i < m_; ++i)
     if (changed_[at(i)]) group.rows.push_back(i);
@@ -56,15 +56,15 @@ ColumnSearch::Outcome ColumnSearch::probe_together(const std::vector<std::size_t
   for (const std::size_t k : members) change(groups_[k]);
   changed_.assign(at(m_), 0);
   long known = 0;
-  const bool answered = probe_(columns_, changed_);
+  const bool evaluated = probe_(columns_, changed_);
   for (const std::size_t k : members) {
-    if (!answered) break;
+    if (!evaluated) break;
     const auto silent = [this](int i) { return changed_[at(i)] == 0; };
     std::vector<int>& rows = groups_[k].rows;
     rows.erase(std::remove_if(rows.begin(), rows.end(), silent), rows.end());
     known += static_cast<long>(rows.size());
   }
-  if (answered && known == std::count(changed_.begin(), changed_.end(), 1)) return Outcome::found;
+  if (evaluated && known == std::count(changed_.begin(), changed_.end(), 1)) return Outcome::found;
   // The probe failed, or a row changed that no parent group had changed: groups are probed singly.
   for (const std::size_t k : members) {
     const Outcome outcome = probe_alone(groups_[k]);
@@ -90,11 +90,11 @@ ColumnSearch::Outcome ColumnSearch::run(std::vector<char>* filled) {
     }
     std::vector<Group> halves;
     halves.reserve(2 * groups_.size());
-    std::size_t answers = 0;
+    std::size_t rows_of_groups = 0;
     for (Group& group : groups_) {
       if (group.rows.empty()) continue;
-      answers += group.rows.size();
-      if (answers > kMostProbes) return Outcome::too_many_probes;
+      rows_of_groups += group.rows.size();
+      if (rows_of_groups > kMostProbes) return Outcome::too_many_probes;
       if (group.end - group.begin == 1) {
         (*filled)[at(group.begin)] = 1;
         continue;

@@ -89,7 +89,7 @@ class SplitRows {
   int rank() const { return d.solver.rank() + a.solver.rank(); }
   /// The rows whose move is measured in tolerances.
   Block& counted() { return d.rows.empty() ? a : d; }
-  /// After a move of this length with the C at hand: C at y, where it is time to learn from it.
+  /// After a move of this length: evaluates C at y if its turn is to be measured.
   Status learn_trust(Evaluator& evaluator, double t, const double* y, const double* WT,
                      double length);
   RowTrust trust;

@@ -13,12 +13,12 @@ void Projection::project_sensitivities(Sensitivities sensitivities,
 }
 ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
                                                             N_Vector* s, N_Vector* sp) {
-  return impl_->answer("make_sensitivities_consistent", {yy, yp},
-                       [&] { return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp); });
+  return impl_->report_of("make_sensitivities_consistent", {yy, yp},
+                          [&] { return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp); });
 }
 ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v) {
-  return impl_->answer("project_gradient", {yy, v},
-                       [&] { return impl_->project_gradient(t, yy, v); });
+  return impl_->report_of("project_gradient", {yy, v},
+                          [&] { return impl_->project_gradient(t, yy, v); });
 }
 
 void Projection::Impl::project_sensitivities(Sensitivities given,

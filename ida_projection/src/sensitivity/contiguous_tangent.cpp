@@ -32,7 +32,7 @@ class ContiguousTangent final : public TangentRows {
   void forget_failure() override { evaluator_.forget(); }
 
   Status value(double t, N_Vector y, double* g) override {
-    return told(evaluator_.value(t, N_VGetArrayPointer(y), size(), g));
+    return with_message(evaluator_.value(t, N_VGetArrayPointer(y), size(), g));
   }
 
   Status evaluate(double t, N_Vector y, N_Vector weights, N_Vector id) override {
@@ -47,7 +47,7 @@ class ContiguousTangent final : public TangentRows {
       known_ = false;
       status = blocks_.evaluate(evaluator_, t, y_.data(), WT);
     }
-    return told(status);
+    return with_message(status);
   }
 
   Status factor(N_Vector D) override {
@@ -93,13 +93,13 @@ class ContiguousTangent final : public TangentRows {
     slope_.resize(g_.size());
     const Status status = central_differences(d, slope_, g_, [&](double e, auto& g) {
       for (std::size_t j = 0; j < y_.size(); ++j) shifted_[j] = y_[j] + e * s[j];
-      return told(evaluator_.value(t_, shifted_.data(), size(), g.data()));
+      return with_message(evaluator_.value(t_, shifted_.data(), size(), g.data()));
     });
     std::copy(slope_.begin(), slope_.end(), r);
     return status;
   }
 
-  Status told(Status status) {
+  Status with_message(Status status) {
     if (status != Status::success) message_ = evaluator_.message();
     return status;
   }

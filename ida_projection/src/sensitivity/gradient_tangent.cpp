@@ -21,14 +21,14 @@ class GradientTangent final : public TangentRows {
   int rows() const override { return store_.rows(); }
 
   Status value(double t, N_Vector y, double* g) override {
-    const Status status = told(store_.value(t, y));
+    const Status status = with_message(store_.value(t, y));
     std::copy(store_.g().begin(), store_.g().end(), g);
     return status;
   }
 
   // Algebraic components do not move where no row contains them.
   Status evaluate(double t, N_Vector y, N_Vector weights, N_Vector id) override {
-    const Status status = told(store_.fill(t, y));
+    const Status status = with_message(store_.fill(t, y));
     if (status != Status::success) return status;
     for (std::size_t i = 0; i < C_.size(); ++i) N_VScale(1.0, store_.gradients()[i], C_[i]);
     N_VConst(0.0, WT_);
@@ -43,7 +43,7 @@ class GradientTangent final : public TangentRows {
       N_VProd(D, held_, D_);
     else
       N_VScale(1.0, D, D_);
-    const Status status = told(store_.factor(D_, WT_));
+    const Status status = with_message(store_.factor(D_, WT_));
     store_.keep_firm(RowTrust::kThin);
     return status;
   }
@@ -55,7 +55,7 @@ class GradientTangent final : public TangentRows {
   void solve(const std::vector<double>& r, N_Vector ds) override { store_.solve(r, D_, ds); }
 
  private:
-  Status told(Status status) {
+  Status with_message(Status status) {
     if (status != Status::success) message_ = store_.report.text;
     return status;
   }

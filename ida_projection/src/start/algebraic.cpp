@@ -51,10 +51,10 @@ std::string AlgebraicVariables::derive(const Candidate& candidate, Corrector& co
       large(candidate, corrector, statistics_, Near::irregular_changes(candidate, cj, -1e3, 3.3));
   bool by_small = small.known(), by_large = large.known() && !by_small;
   const auto probe = [&](const std::vector<int>& columns, std::vector<char>& changed) {
-    bool answered = false;  // F may fail at one size; the other one decides then
-    if (by_small) answered = small.notices(columns, Near::Of::rates, changed);
-    if (by_large) answered = large.notices(columns, Near::Of::rates, changed) || answered;
-    return answered;
+    bool evaluated = false;  // F may fail at one size; the other one decides then
+    if (by_small) evaluated = small.notices(columns, Near::Of::rates, changed);
+    if (by_large) evaluated = large.notices(columns, Near::Of::rates, changed) || evaluated;
+    return evaluated;
   };
   std::vector<char> filled;
   constexpr long most = 4L * kLargestProbed;

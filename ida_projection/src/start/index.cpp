@@ -30,15 +30,15 @@ bool AlgebraicVariables::has_rows_of_zeros(const Candidate& candidate, Corrector
   for (std::size_t j = 0; j < free.size(); ++j)
     if (mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
   std::vector<char> noticed(free.size(), 0);
-  bool answered = false;
+  bool evaluated = false;
   for (const double size : {1.0, -1e3}) {  // F may fail at one of them
     NearbyResiduals near(candidate, corrector, statistics_,
                          NearbyResiduals::irregular_changes(candidate, cj, size));
-    answered = near.notices(algebraic, NearbyResiduals::Of::values, noticed) || answered;
+    evaluated = near.notices(algebraic, NearbyResiduals::Of::values, noticed) || evaluated;
   }
   std::size_t zeros = 0;
   for (std::size_t i = 0; i < free.size(); ++i) zeros += free[i] != 0 && noticed[i] == 0;
-  if (!answered || zeros == 0) return false;
+  if (!evaluated || zeros == 0) return false;
   if (zeros == algebraic.size()) found_.undetermined = algebraic;
   return true;
 }

@@ -54,7 +54,7 @@ void AlgebraicTest::begin(const std::vector<int>& variables) {
 }
 
 // Called for another attempt at a step whose last attempt was rejected.
-void AlgebraicTest::look_for_jump(double h, long steps) {
+void AlgebraicTest::detect_jump(double h, long steps) {
   accepted_ = steps != steps_ ? accepted_ + 1 : 0;
   if (accepted_ > kBeyond) {
     refused_h_ = 0.0;
@@ -75,7 +75,7 @@ double AlgebraicTest::widened(const Variable& v, double weight, double y) const 
 
 void AlgebraicTest::begin_attempt(const Candidate& candidate, double move, int order, double h,
                                   long steps) {
-  look_for_jump(h, steps);
+  detect_jump(h, steps);
   h_ = h;
   if (steps != steps_)
     for (Variable& v : variables_) v.response *= kMemory;

@@ -33,7 +33,7 @@ class AlgebraicTest {
     double response;  // to a move by one tolerance, largest of the latest steps
   };
   double widened(const Variable& v, double weight, double y) const;
-  void look_for_jump(double h, long steps);
+  void detect_jump(double h, long steps);
 
   std::vector<Variable> variables_;
   // The last attempt:

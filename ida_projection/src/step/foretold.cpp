@@ -33,15 +33,15 @@ void PolishForecast::doubt() {
 
 void PolishForecast::learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
   if (wait_ > 0) --wait_;
-  const bool told = known(cj);
-  if (told) {
+  const bool learnt = known(cj);
+  if (learnt) {
     N_VLinearSum(1.0, delta, -share_at(cj), ycor, work_);
     N_VLinearSum(1.0, work_, -1.0, beyond_, work_);
     followed(N_VWrmsNorm(work_, weights) <= kUnseen);
   }
   share_ = share_of(weights, ycor, delta);
   N_VLinearSum(1.0, delta, -share_, ycor, beyond_);
-  if (!told) patience_ = N_VWrmsNorm(beyond_, weights) <= kUnseen ? 1 : 0;
+  if (!learnt) allowance_ = N_VWrmsNorm(beyond_, weights) <= kUnseen ? 1 : 0;
   cj_ = cj;
   used_in_row_ = 0;
   N_VLinearSum(1.0, delta, kappa(cj), ycor, work_);

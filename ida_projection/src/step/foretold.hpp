@@ -23,7 +23,9 @@ class PolishForecast {
   /// Learns from a computed delta.
   void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj);
   /// Whether delta can be forecast for a correction with this cj.
-  bool tells(double cj) const { return used_in_row_ < patience_ && wait_ == 0 && known(cj); }
+  bool can_forecast(double cj) const {
+    return used_in_row_ < allowance_ && wait_ == 0 && known(cj);
+  }
   void tell(double cj, N_Vector ycor, N_Vector delta) const {
     N_VLinearSum(share_at(cj), ycor, 1.0, beyond_, delta);
   }
@@ -35,7 +37,7 @@ class PolishForecast {
   double share_at(double cj) const { return share_ + kappa(cj_) - kappa(cj); }
   double share_of(N_Vector weights, N_Vector ycor, N_Vector delta);
   void followed(bool right) {
-    patience_ = right ? (2 * patience_ + 1 < kMost ? 2 * patience_ + 1 : kMost) : patience_ / 2;
+    allowance_ = right ? (2 * allowance_ + 1 < kMost ? 2 * allowance_ + 1 : kMost) : allowance_ / 2;
   }
   static constexpr int kMost = 15;  // in a row
 
@@ -44,7 +46,7 @@ class PolishForecast {
   double cj_ = 0.0;         // of the last iteration; 0: there was none with these factors
   double share_ = 0.0;      // delta was share ycor + beyond
   bool not_stiff_ = false;  // and next to -kappa ycor
-  int patience_ = 0, used_in_row_ = 0;
+  int allowance_ = 0, used_in_row_ = 0;
   int wait_ = 0;  // iterations until it is foretold again
 };
 

@@ -106,8 +106,8 @@ const double* Polish::response(const StepData& step) {
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
   if (in_use(Mechanism::foretold_polish) && forecast_polish(candidate, cj, tolerance))
     return {true, true};
-  const bool asked = step_known_;
-  if (!asked) {
+  const bool known = step_known_;
+  if (!known) {
     if (!newton_step_at_moved_point(candidate)) return {};
     ++statistics_.residual_evaluations;
   }
@@ -121,7 +121,7 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
     N_VConst(0.0, delta_);
     return {true, false};
   }
-  if (!asked) learn_pattern(candidate, cj);
+  if (!known) learn_pattern(candidate, cj);
   const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
@@ -137,7 +137,7 @@ void Polish::learn_pattern(const Candidate& candidate, double cj) {
 
 // ycor <- ycor + delta, if delta can be forecast.
 bool Polish::forecast_polish(const Candidate& candidate, double cj, double tolerance) {
-  if (!forecast_ || step_known_ || corrector_.iterations() != 1 || !forecast_->tells(cj))
+  if (!forecast_ || step_known_ || corrector_.iterations() != 1 || !forecast_->can_forecast(cj))
     return false;
   forecast_->tell(cj, corrected_, delta_);
   if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisledFactor * tolerance)) return false;

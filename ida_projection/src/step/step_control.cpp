@@ -101,7 +101,7 @@ void StepControl::count_refusals(bool engaged) {
   const long failures = ida_.error_test_failures();
   refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
   last_error_failures_ = failures;
-  if (engaged && refused_in_row_ >= kTrapped) begin_smoothing(Care());
+  if (engaged && refused_in_row_ >= kTrapped) begin_smoothing(SetpointFactors());
 }
 
 bool StepControl::struggling() const {
@@ -123,9 +123,9 @@ bool StepControl::in_trouble(long steps) const {
   return corrector_has_failed_ || (failures > 1 && kOftenRefused * failures > steps);
 }
 
-void StepControl::begin_smoothing(const Care& care) {
+void StepControl::begin_smoothing(const SetpointFactors& factors) {
   if (smoother_.on() || !options_.advanced.smooth_where_needed) return;
-  smoother_.begin(care);
+  smoother_.begin(factors);
   ++statistics_.smoothing_begun;
 }
 

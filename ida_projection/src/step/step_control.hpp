@@ -45,7 +45,7 @@ class StepControl {
 
   bool smoothing() const { return smoother_.on(); }
   /// Begins smoothing with a stricter setpoint.
-  void begin_smoothing(const Care& care);
+  void begin_smoothing(const SetpointFactors& factors);
   /// For each new step.
   void count_refusals(bool engaged);
   void expect_oscillations() { order_limit_.expect_oscillations(); }

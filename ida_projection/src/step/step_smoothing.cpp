@@ -73,8 +73,8 @@ void StepSmoother::attempt_was_accepted() {
 // orders become shorter by the same factor.
 double StepSmoother::setpoint(int order) const {
   const double graded =
-      now_.care.most * std::pow(kOfOrder, order - options_.advanced.maximum_order);
-  return kSetpoint * std::max(graded, std::min(now_.care.least, now_.care.most));
+      now_.factors.most * std::pow(kOfOrder, order - options_.advanced.maximum_order);
+  return kSetpoint * std::max(graded, std::min(now_.factors.least, now_.factors.most));
 }
 
 double StepSmoother::filter(double log_c, int order) const {
@@ -166,8 +166,8 @@ double StepSmoother::request(double ratio, double h, bool grows, double norm) {
 // 0.5. The weights are multiplied so that the error exceeds 0.5 but passes the test. The order,
 // which compares errors, does not change.
 double StepSmoother::reduce_by_weights(double ratio, double h, double norm) {
-  constexpr double kAsked = 0.55, kPassed = 0.95;
-  const double factor = kAsked / (error_constant(h, now_.order) * norm);
+  constexpr double kReducing = 0.55, kPassed = 0.95;
+  const double factor = kReducing / (error_constant(h, now_.order) * norm);
   if (!(factor > 1.0) || factor * test_constant(h, now_.order) * norm > kPassed) {
     hold();
     return 1.0;

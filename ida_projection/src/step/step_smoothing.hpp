@@ -13,7 +13,7 @@ constexpr double kAnyRatio = 1e30;
 
 /// Factors of the setpoint s: at the largest order, and its least value at lower orders, see
 /// StepSmoother::setpoint().
-struct Care {
+struct SetpointFactors {
   double most = 1.0, least = 1.0;
 };
 
@@ -37,11 +37,11 @@ class StepSmoother {
   /// Before the first step: on only if Options::step_smoothing says so.
   void reset();
   /// From here on, in the middle of a run; leaves IDASetMaxStep alone, which the host may have
-  /// used. The setpoint is `care.most` times the usual one.
-  void begin(const Care& care) {
+  /// used. The setpoint is `factors.most` times the usual one.
+  void begin(const SetpointFactors& factors) {
     on_ = true;
     settings_.reset();
-    now_.care = care;
+    now_.factors = factors;
   }
   bool on() const { return on_; }
   /// The corrector failed at this step size.
@@ -80,7 +80,7 @@ class StepSmoother {
 
   // From a new run on.
   struct State {
-    Care care;
+    SetpointFactors factors;
     long steps = -1;  // accepted before the attempt that IDA has not yet judged; -1: there is none
     double h = 0.0, log_c = 0.0;  // of it
     int order = 0;

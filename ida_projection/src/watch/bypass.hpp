@@ -30,7 +30,7 @@ class BypassWatch {
             " steps without the plugin, which projected none of them: another nonlinear solver was "
             "attached after it; make the Projection last, or hand that solver over in "
             "Options::nonlinear_solver";
-    report.say(text_);
+    report.print(text_);
   }
   long steps() const { return steps_unseen_; }
   /// Advice, once a step went by; it then stays as it is.

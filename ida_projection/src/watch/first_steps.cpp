@@ -21,7 +21,7 @@ constexpr int kSeen = 3;            // times, before a vanished row or a small s
 constexpr double kMoves = 0.05;     // of y in a step: it is no state of rest
 constexpr double kGrows = 1.02;     // for each step: a solution from zero may be small at first
 
-// Looks into doubts until the step after so many.
+// Checks of suspected rows that are allowed until the step after so many.
 long allowed_checks(long steps) { return 20 + steps / 100; }
 
 }  // namespace
@@ -173,7 +173,7 @@ std::string FirstSteps::look_into(int row, double noticed, const Attempt& at) {
   faults_.pass_end_to(at.corrector);
   if (!(std::abs(tangency_.rate[i] + in_time - without_C) > kNoInvariant * terms) || !may_search())
     return {};
-  run_.searched += point_.size();  // C at hand may be of an earlier step: mostly nothing is wrong
+  run_.searched += point_.size();  // the present C may be of an earlier step: mostly it is right
   const std::string found = faults_.wrong_entry(t, point_);
   return found.empty() ? found : "check_jacobian finds at t = " + brief(t) + ": " + found;
 }

@@ -24,7 +24,7 @@ class FirstSteps {
 
   void reset();  ///< a new run starts
   /// Whether the step after `steps` accepted ones is checked.
-  static bool looks(long steps) {
+  static bool are_checked(long steps) {
     return steps >= kSettled && (steps <= kSteps || steps % kEvery == 0);
   }
   /// Whether a row was named that F does not keep.

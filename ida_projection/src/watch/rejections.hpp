@@ -42,10 +42,10 @@ class RejectionWatch {
   RowFaults* faults_;
   long moved_in_row_ = 0, standing_ = 0;         // accepted steps
   long rejections_ = 0, rejections_before_ = 0;  // attempts that IDA repeated
-  long window_begin_ = 0;                        // accepted steps when they were last looked at
+  long window_begin_ = 0;                        // accepted steps when they were last counted
   long refused_steps_ = 0, last_refused_ = -1;   // of these, steps with a rejection
   bool refused_ = false;                         // most steps of a stretch
-  long suspected_ = -1;                          // the step looked into
+  long suspected_ = -1;                          // the step that was diagnosed
   std::string suspicion_;                        // found then
 };
 

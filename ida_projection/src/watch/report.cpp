@@ -81,35 +81,35 @@ void Report::print_fatal(const char* text) noexcept {
   std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
 }
 
-bool Report::says_failures(long steps) const {
+bool Report::prints_failures(long steps) const {
   const int failures = steps == failing_step_ ? failures_in_step_ + 1 : 1;
   return failures >= (steps == 0 ? kSayAfterAtFirst : kSayAfter);
 }
 
 void Report::count_failure_in_step(const std::string& text, long steps) {
-  const bool say_it = says_failures(steps);
+  const bool prints = prints_failures(steps);
   failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
   failing_step_ = steps;
-  if (say_it)
-    say_once(Status::not_converged, "step " + std::to_string(steps + 1) + " was tried " +
-                                        std::to_string(failures_in_step_) +
-                                        " times without a point on the constraints: " + text);
+  if (prints)
+    print_once(Status::not_converged, "step " + std::to_string(steps + 1) + " was tried " +
+                                          std::to_string(failures_in_step_) +
+                                          " times without a point on the constraints: " + text);
 }
 
-void Report::warn(Status kind, const std::string& text, const std::string& said) {
+void Report::warn(Status kind, const std::string& text, const std::string& printed) {
   warning_ = text;
   warning_status_ = kind;
-  say_once(kind, said);
+  print_once(kind, printed);
 }
 
 // A bit for each kind: not again after every IDAReInit.
-void Report::say_once(Status kind, const std::string& text) {
+void Report::print_once(Status kind, const std::string& text) {
   const unsigned bit = 1U << static_cast<unsigned>(kind);
-  if ((said_ & bit) == 0) say(text);
-  said_ |= bit;
+  if ((printed_kinds_ & bit) == 0) print(text);
+  printed_kinds_ |= bit;
 }
 
-void Report::say(const std::string& text) const {
+void Report::print(const std::string& text) const {
   if (options_.print) std::fprintf(stderr, "tether: %s\n", text.c_str());
 }
 

@@ -27,12 +27,12 @@ class Report {
   /// The same for an exception, which must not pass through IDA's C functions.
   int caught(Status outcome, const char* text) noexcept;
   /// Whether the next failure in the step after `steps` is printed.
-  bool says_failures(long steps) const;
+  bool prints_failures(long steps) const;
   /// Keeps the reason why IDA rejects most steps or results are doubtful; prints `said` on stderr.
-  void warn(Status kind, const std::string& text, const std::string& said);
+  void warn(Status kind, const std::string& text, const std::string& printed);
   void warn(Status kind, const std::string& text) { warn(kind, text, text); }
   /// Prints on stderr if Options::print is set.
-  void say(const std::string& text) const;
+  void print(const std::string& text) const;
   /// A new run starts.
   void reset();
 
@@ -44,20 +44,20 @@ class Report {
   }
   const std::string& warning_text() const { return warning_; }
   Status warning() const { return warning_status_; }
-  Status told() const { return status == Status::success ? warning_status_ : status; }
+  Status status_or_warning() const { return status == Status::success ? warning_status_ : status; }
   const std::string& text() const { return message.empty() ? warning_ : message; }
 
  private:
   void count_failure_in_step(const std::string& text, long steps);
   void print_fatal(const char* text) noexcept;
-  void say_once(Status kind, const std::string& text);
+  void print_once(Status kind, const std::string& text);
 
   const Options& options_;
   Statistics& statistics_;
   std::string warning_;
   Status warning_status_ = Status::success;
-  unsigned said_ = 0;  // kinds of warnings
-  bool printed_ = false;
+  unsigned printed_kinds_ = 0;  // a bit for each kind of warning
+  bool printed_ = false;        // the failure of the run
   long failing_step_ = -1;
   int failures_in_step_ = 0;
 };

@@ -75,7 +75,7 @@ void GramFactor::analyse(int n, const std::vector<int>& starts, const std::vecto
   solution_.assign(at(m_), 0.0);
   inverse_d_.assign(at(m_), 0.0);
   dependent_.assign(at(m_), 0);
-  doubtful_.reserve(at(m_));
+  uncertain_.reserve(at(m_));
   square_.reserve(at(m_));
 }
 
@@ -233,21 +233,21 @@ int GramFactor::factor(const double* A, const double* norm, double eps, double t
   std::fill(L_.filled.begin(), L_.filled.end(), 0);
   std::fill(PA_.met.begin(), PA_.met.end(), 0);
   eps_ = eps;
-  doubtful_.clear();
+  uncertain_.clear();
   int count = 0;
   for (int k = 0; k < m_; ++k) {
     scatter_products(k, A);
     // In exact arithmetic d is at least eps.
     const double d = std::max(eliminate(k, 1.0 + eps), eps);
-    const bool looked_at = d <= std::max(kThin * eps, thin);
-    const bool dependent = (looked_at && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
+    const bool examined = d <= std::max(kThin * eps, thin);
+    const bool dependent = (examined && d <= kDependent * eps * (1.0 + coefficients_square(k))) ||
                            !(norm[row_at_[at(k)]] > 0.0);
     dependent_[at(k)] = dependent;
     count += dependent;
     inverse_d_[at(k)] = 1.0 / d;
-    if (looked_at && !dependent) doubtful_.push_back(k);
+    if (examined && !dependent) uncertain_.push_back(k);
   }
-  return count + resolve_doubts();
+  return count + resolve_uncertain();
 }
 
 // Decides about thin rows that do not depend on the rows in their own pattern alone: the row that
@@ -255,26 +255,26 @@ int GramFactor::factor(const double* A, const double* norm, double eps, double t
 // independent components of mean 0 and variance 1, (c . z)^2 has the mean |c|^2, and
 // c . z = z_k - (L^-1 z)_k, so that one substitution serves all rows. Returns how many are
 // dependent.
-int GramFactor::resolve_doubts() {
-  if (doubtful_.empty()) return 0;
-  square_.assign(doubtful_.size(), 0.0);
+int GramFactor::resolve_uncertain() {
+  if (uncertain_.empty()) return 0;
+  square_.assign(uncertain_.size(), 0.0);
   std::uint32_t random = 1;
   for (int probe = 0; probe < kProbes; ++probe) {
     for (double& component : solution_) {
       random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
       component = std::sqrt(12.0) * (random / 4294967296.0 - 0.5);
     }
-    for (std::size_t q = 0; q < doubtful_.size(); ++q) work_[q] = solution_[at(doubtful_[q])];
+    for (std::size_t q = 0; q < uncertain_.size(); ++q) work_[q] = solution_[at(uncertain_[q])];
     forward_in_place();
-    for (std::size_t q = 0; q < doubtful_.size(); ++q) {
-      const double product = work_[q] - solution_[at(doubtful_[q])];
+    for (std::size_t q = 0; q < uncertain_.size(); ++q) {
+      const double product = work_[q] - solution_[at(uncertain_[q])];
       square_[q] += product * product / kProbes;
       work_[q] = 0.0;
     }
   }
   int count = 0;
-  for (std::size_t q = 0; q < doubtful_.size(); ++q) {
-    const int k = doubtful_[q];
+  for (std::size_t q = 0; q < uncertain_.size(); ++q) {
+    const int k = uncertain_[q];
     dependent_[at(k)] = 1.0 / inverse_d_[at(k)] <= kDependentByProbes * eps_ * (1.0 + square_[q]);
     count += dependent_[at(k)];
   }

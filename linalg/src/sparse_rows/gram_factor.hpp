@@ -44,7 +44,7 @@ class GramFactor {
   void find_supernodes();
   double eliminate(int k, double d);
   double coefficients_square(int k);
-  int resolve_doubts();
+  int resolve_uncertain();
   void scatter_products(int k, const double* A);
   void forward_in_place();
   void back_in_place();
@@ -70,7 +70,7 @@ class GramFactor {
   double eps_ = 0.0;
   std::vector<double> inverse_d_, work_, solution_;
   std::vector<char> dependent_;
-  std::vector<int> doubtful_;   // rows of P A
+  std::vector<int> uncertain_;  // rows of P A
   std::vector<double> square_;  // of their coefficients
 };
 

@@ -157,7 +157,7 @@ class Driver {
   struct {
     double work = 0, time = 0;
     long events = 0;
-  } storm_;  // where the work was looked at last
+  } storm_;  // where the work was checked last
   long at_one_time_ = 0;
   std::vector<bool> lifted_;  // at the time of the last event, whose forces vanished
   bool jammed_ = false;       // at this event

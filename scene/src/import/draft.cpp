@@ -51,7 +51,7 @@ std::optional<Joint> as_one(const Chain& chain) {
     out.kind = JointKind::universal;
     out.at = *point;
     out.axis = chain[1].axis;         // carried by the body itself
-    out.axis_second = chain[0].axis;  // by the one that it hangs on
+    out.axis_second = chain[0].axis;  // by its parent
     return out;
   }
   if (hinges == 3 && slides == 0) {

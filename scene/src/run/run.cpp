@@ -172,7 +172,7 @@ class Run {
     if (event.end && !event.record) record();
   }
 
-  // Steps may be longer than the time between stops: no state is looked at, or recorded, twice.
+  // Steps may be longer than the time between stops: no state is judged, or recorded, twice.
   void look() {
     if (looked_at_ == engine_->time()) return;
     diagnostics_ = engine_->diagnostics();
@@ -256,7 +256,7 @@ class Run {
     if (summary().residual > allowed)
       result_.warnings.push_back(
           fmt::format("a contact problem was used at a residual of {:.2e}, above the {:.2g} that "
-                      "stepping.acceptance allows: shorter parts and more work did not help",
+                      "stepping.acceptance allows: shorter sub-steps and more work did not help",
                       summary().residual, allowed));
   }
 

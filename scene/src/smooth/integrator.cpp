@@ -72,8 +72,8 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   session_->set_newton(index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
   if (options.projection) {
     ida_projection::Options projection;
-    // Close to singular positions F answers to any move, without being stiff: no other metric is to
-    // be tried.
+    // Close to singular positions F responds to any move, without being stiff: no other metric is
+    // to be tried.
     projection.advanced.metric = ida_projection::Metric::local_correction;
     // Errors then follow the tolerance; by IDA's own rule one tolerance in ten ends twenty times
     // worse than its neighbours where singular positions magnify errors.
@@ -166,7 +166,7 @@ bool Integrator::advance(double t, long& steps_left, const std::function<bool()>
     // IDA has nothing to do where its last step has just ended and leaves y as the corrector summed
     // it; who comes from a time within that step reads it from the history, by other roundings.
     if (flag >= 0 && to == step_end()) IDAGetDky(session_->ida(), to, 0, session_->y());
-    // Nobody looks at y' between steps.
+    // y' between steps is not used.
     if (session_->projection() != nullptr && flag >= 0)
       session_->projection()->project(t_, session_->y(), nullptr);
   }

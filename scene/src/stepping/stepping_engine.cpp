@@ -59,7 +59,7 @@ void exchange(Archive& io, int bodies, contact::StepContacts& contacts) {
   });
 }
 
-// Whether they fit the bodies is looked at by the stepper.
+// The stepper checks whether they fit the bodies.
 void exchange(Archive& io, int bodies, StepperMemory::Sleep& sleep) {
   io.list(sleep.bodies, [&](StepperMemory::Rest& r) {
     io(r.slow, r.island, r.fresh, r.acceleration, r.angular_acceleration);
@@ -106,7 +106,7 @@ void exchange(Archive& io, int bodies, StepperMemory& m) {
 }
 
 // A state cannot do without the same bodies and step. Whether the rest of the scene is the
-// same is looked at by who keeps the file.
+// same is checked by the owner of the file.
 std::uint64_t fingerprint(const Scene& scene, double step) {
   std::string text(reinterpret_cast<const char*>(&step), sizeof step);
   for (const Body& body : scene.bodies) {
@@ -247,13 +247,13 @@ void SteppingEngine::report_failure() const {
   if (!stepper_.joints_met())
     throw SimulationError(fmt::format(
         "t = {:g} s: the joints are not met at the end of the step, off by up to {:g} m or rad, "
-        "also in its parts: bodies turn too far in them; reduce stepping.step, or set "
+        "also in its sub-steps: bodies turn too far in them; reduce stepping.step, or set "
         "on_failure = \"warn\"",
         time(), stepper_.joint_drift()));
   const std::size_t contacts = stepper_.contacts().points.size();
   std::string text = fmt::format(
       "t = {:g} s: the problem of {} was not solved: {} at a residual of {:g}, wanted {:g}, also "
-      "in parts of {:g} s; raise stepping.tolerance or stepping.max_halvings, reduce "
+      "in sub-steps of {:g} s; raise stepping.tolerance or stepping.max_halvings, reduce "
       "stepping.step, or set on_failure = \"warn\"",
       time(),
       contacts == 0 ? std::string("the limits, motors and friction of joints")
@@ -304,7 +304,7 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
   const contact::StepContacts& c = stepper_.contacts();
   const contact::BodySet& b = stepper_.bodies();
   const std::vector<Vector3d>& moments = stepper_.contact_moments();
-  const double dt = stepper_.last_part();
+  const double dt = stepper_.last_sub_step();
   contacts_.resize(c.points.size());
   for (std::size_t k = 0; k < c.points.size(); ++k) {
     const contact::PointContact& p = c.points[k];
@@ -329,7 +329,7 @@ Forces SteppingEngine::forces() const {
   Forces out;
   if (joints_)
     out.joints = joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(),
-                                 stepper_.law_impulses(), stepper_.last_part());
+                                 stepper_.law_impulses(), stepper_.last_sub_step());
   stepped_.copy_motions(stepper_.bodies());
   for (const auto& force : forces_) force->report(stepped_.bodies(), out);
   return out;

@@ -116,7 +116,7 @@ TEST_CASE("robot files of thousands of parts cost no more than their length") {
   };
   CHECK(growth(chain, 2000) < kLinear);
 
-  // Links without mass that hang on one.
+  // Links without mass below one.
   const auto fan = [](int links) {
     std::string text = "<robot name='r'><link name='l'>" + kMass + "</link><link name='m'>" +
                        kMass +

@@ -83,7 +83,7 @@ class ConeProblem {
                             const linalg::VectorView& compliance = linalg::VectorX());
   /// M v = J'x + f, w = J v + bias: A = J M^-1 J' and b = -(J M^-1 f + bias). M, positive
   /// definite, has f.size() rows; of its two halves one is given, or both: their mean counts. Parts
-  /// of M that hang together are factored by themselves (Cholesky); A is dense over the rows of
+  /// of M that are connected are factored by themselves (Cholesky); A is dense over the rows of
   /// each.
   static ConeProblem saddle(const std::vector<MatrixEntry>& M, const std::vector<MatrixEntry>& J,
                             const linalg::VectorView& f, const linalg::VectorView& bias,
@@ -140,7 +140,7 @@ struct ConeSolution {
   std::vector<int> contradicting;
   /// Blocks that approach though free rows hold their normal (status infeasible).
   std::vector<int> blocked;
-  /// As Solution::infeasible_direction, by row; free rows answer to it.
+  /// As Solution::infeasible_direction, by row; free rows have the impulses that it causes.
   std::vector<double> infeasible_direction;
   Counts counts;       ///< work of the solve
   std::string advice;  ///< what to try when it is not solved

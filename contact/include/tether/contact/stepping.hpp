@@ -200,12 +200,12 @@ struct StepCounts {
   /// Sub-steps that were repeated count each time in contact_problems, sweeps and
   /// assembled_islands.
   long steps = 0, contact_problems = 0, sweeps = 0, assembled_islands = 0;
-  long bounces = 0;   ///< contacts that got an impulse of restitution
-  long accepted = 0;  ///< problems above the tolerance that were accepted
-  long halved = 0;    ///< steps and sub-steps that were taken in two halves
-  long parts = 0;     ///< with an accuracy: sub-steps that steps were taken in
-  long rejected = 0;  ///< and sub-steps that were not accurate enough, or had an impact on the way
-  long unsolved = 0;  ///< problems that were used though above what is accepted
+  long bounces = 0;    ///< contacts that got an impulse of restitution
+  long accepted = 0;   ///< problems above the tolerance that were accepted
+  long halved = 0;     ///< steps and sub-steps that were taken in two halves
+  long sub_steps = 0;  ///< with an accuracy: sub-steps that steps were taken in
+  long rejected = 0;   ///< and sub-steps that were not accurate enough, or had an impact on the way
+  long unsolved = 0;   ///< problems that were used though above what is accepted
 };
 
 /// State of a Stepper beside positions and velocities: warm starts, kept momenta, and the contacts
@@ -329,7 +329,7 @@ class Stepper {
   const std::vector<double>& law_impulses() const;
   /// Length, s, of the last sub-step, to which the impulses belong: forces are impulses over
   /// it. 0 before the first step, and after set_memory().
-  double last_part() const;
+  double last_sub_step() const;
   int asleep() const;                      ///< bodies that sleep
   const StepCounts& counts() const;        ///< since the start
   std::vector<StageCost> costs() const;    ///< since the start, one for each effect

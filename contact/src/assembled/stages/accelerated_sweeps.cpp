@@ -23,7 +23,7 @@ void AcceleratedSweeps::start(const PackedVector* x) {
   anderson_.clear();
   grown_ = 1;
   sweeps_ = quiet_ = slow_ = 0;
-  quiet_asked_ = kLeastQuiet;
+  quiet_checked_ = kLeastQuiet;
   accelerate_ = !carried();
   eager_ = accelerate_;
   earlier_ = {};
@@ -80,7 +80,8 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   if (eager_) window_f_ = std::numeric_limits<double>::infinity();
   eager_ = false;
   if (!accelerate_) {
-    if (quiet_ < (carried() ? std::max(kCarriedQuiet, quiet_asked_) : quiet_asked_)) return false;
+    if (quiet_ < (carried() ? std::max(kCarriedQuiet, quiet_checked_) : quiet_checked_))
+      return false;
     accelerate_ = true;
     anderson_.clear();
     least_f_ = begun_f_ = window_f_ = f;
@@ -96,12 +97,12 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   if (failed) {
     accelerate_ = false;
     quiet_ = 0;
-    quiet_asked_ = std::min(2 * quiet_asked_, kMostQuiet);
+    quiet_checked_ = std::min(2 * quiet_checked_, kMostQuiet);
     return false;
   }
   if (f < 0.1 * begun_f_) {
     begun_f_ = f;
-    quiet_asked_ = kLeastQuiet;
+    quiet_checked_ = kLeastQuiet;
   }
   least_f_ = std::min(least_f_, f);
   return true;

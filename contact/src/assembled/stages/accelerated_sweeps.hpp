@@ -39,7 +39,7 @@ class AcceleratedSweeps {
   std::vector<char> regime_;  // of each contact after the last sweep
   // f: weighted change of a sweep.
   bool accelerate_ = false, eager_ = false;
-  int sweeps_ = 0, quiet_ = 0, slow_ = 0, quiet_asked_ = kLeastQuiet, window_end_ = 0;
+  int sweeps_ = 0, quiet_ = 0, slow_ = 0, quiet_checked_ = kLeastQuiet, window_end_ = 0;
   double least_f_ = 0, begun_f_ = 0, window_f_ = 0;
   double recent_[kRecent] = {};
   struct Mark {

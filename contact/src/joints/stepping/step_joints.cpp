@@ -47,7 +47,7 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
   }
   for (auto p = pairs.begin(); p != pairs.end(); p = pairs.upper_bound(*p))
     if (pairs.count(*p) >= kRowsOfJoint) joined_.push_back(*p);
-  factored_.clear();  // begin() looks at the positions
+  factored_.clear();  // begin() factors at the present positions
 }
 
 bool StepJoints::are_joined(int first, int second) const {

@@ -22,7 +22,7 @@ TETHER_INLINE Mask less(Real a, Real b) { return a < b; }
 TETHER_INLINE Mask at_most(Real a, Real b) { return a <= b; }
 TETHER_INLINE Mask both(Mask a, Mask b) { return a & b; }
 TETHER_INLINE Real choose(Mask m, Real a, Real b) { return m ? a : b; }
-TETHER_INLINE Real or_one(Mask, Real a) { return a; }  // nobody looks at a number left out
+TETHER_INLINE Real or_one(Mask, Real a) { return a; }               // masked lanes are not used
 TETHER_INLINE Real least(Real a, Real b) { return a < b ? a : b; }  // b if one is NaN
 TETHER_INLINE Real most(Real a, Real b) { return a > b ? a : b; }
 TETHER_INLINE int lanes(Mask m) { return m; }

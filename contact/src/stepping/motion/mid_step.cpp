@@ -89,9 +89,9 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
     const Vector3d u = relative_velocity(a, b, now);
     const Vector3d v =
         relative_velocity(then_.motion[at(now.first)], then_.motion[at(now.second)], *then);
-    // In the middle joints are met to O(dt^2), at the start exactly by the velocities that have not
-    // been bent: where bodies that they connect rest on more contacts than they need, differences
-    // would choose who carries the load.
+    // Joints are met to O(dt^2) in the middle, but exactly at the start. If bodies that joints
+    // connect rest on redundant contacts, such differences would decide which contact carries the
+    // load.
     now.bias += held(now.first) || held(now.second)
                     ? now.normal.dot(bend(now.second, now.r2) - bend(now.first, now.r1))
                     : then->normal.dot(v) - now.normal.dot(u);

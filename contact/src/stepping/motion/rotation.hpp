@@ -31,8 +31,8 @@ Eigen::Vector3d gyroscopic_explicit(const Eigen::Matrix3d& inertia,
 Eigen::Vector3d gyroscopic_implicit(const Eigen::Matrix3d& inertia, const linalg::Quaternion& q,
                                     const Eigen::Vector3d& w, double dt);
 
-/// The momentum of a body that nothing acts upon: taken over from step to step as long as its state
-/// is the one that was left, since the round-off of computing it anew has a sign and would add up.
+/// Angular momentum of a body without torque. It is kept from step to step as long as the state of
+/// the body is unchanged, because rounding of computing it anew is biased and would add up.
 struct FreeSpin {
   Eigen::Vector3d L = Eigen::Vector3d::Zero(), w = Eigen::Vector3d::Zero();
   linalg::Quaternion q = linalg::Quaternion::Identity();

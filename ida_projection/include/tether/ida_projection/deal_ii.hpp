@@ -161,7 +161,7 @@ Run solve_dae(::dealii::SUNDIALS::IDA<VectorType>& ida, const Rows<VectorType>& 
     restarted = false;
     ++run.attached;
   };
-  // In its release mode deal.II 9.4 does not look at what IDASolve returns, and goes on for ever.
+  // In its release mode deal.II 9.4 ignores what IDASolve returns, and goes on for ever.
   const auto check = [&](double t) {
     if (static_cast<int>(projection->status()) < 0 || !(t > last))
       throw std::runtime_error("deal_ii::solve_dae: IDA ended at t = " + detail::number(t) + ": " +

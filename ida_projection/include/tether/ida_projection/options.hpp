@@ -36,7 +36,7 @@ enum class LongMove {
 
 /// The parts of y that the polish, a Newton iteration on F beside the move, changes.
 enum class Polished {
-  all,           ///< algebraic variables answer to the move, and what IDA's test left is removed
+  all,           ///< algebraic variables respond to the move; noise that IDA's test left is removed
   differential,  ///< the second alone
   none,          ///< no F is evaluated for it
 };

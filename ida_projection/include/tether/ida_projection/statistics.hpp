@@ -42,7 +42,7 @@ struct Statistics {
   long corrector_failures = 0;    ///< the decorated solver itself failed; not projected
 
   double largest_drift_before = 0.0;  ///< largest |g_i| that the corrector left
-  double largest_drift_after = 0.0;   ///< largest |g_i| left, looked at on every 16th projection
+  double largest_drift_after = 0.0;   ///< largest |g_i| left, measured on every 16th projection
   double largest_move = 0.0;          ///< in tolerances (WRMS)
   double mean_move = 0.0;             ///< in tolerances (WRMS)
   double seconds = 0.0;  ///< wall time in the projection; measured on every 16th and scaled up

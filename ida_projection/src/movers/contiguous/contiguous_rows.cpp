@@ -31,7 +31,7 @@ template <class Rows>
 Status ContiguousRows<Rows>::value(double t, bool with_rows) {
   rows_known_ = false;
   if (!with_rows || !evaluator_.gives_both())
-    return told(evaluator_.value(t, at_.y.data(), unknowns(), g_.data()));
+    return with_message(evaluator_.value(t, at_.y.data(), unknowns(), g_.data()));
   const Status status = rows(t, g_.data());
   rows_known_ = status == Status::success;
   return status;
@@ -119,7 +119,7 @@ Status ContiguousRows<Rows>::rows(double t, double* g) {
     fill_metric();
     status = blocks_.evaluate(evaluator_, t, at_.y.data(), WT);
   }
-  return told(status);
+  return with_message(status);
 }
 
 template <class Rows>
@@ -199,8 +199,8 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
     }
   }
   // A polish of few rows is too short to show it.
-  const bool tells = how != Solve::rest || traits.measures_rest;
-  if (Rows::kKeepsRank && tells && !dropped_follow()) {
+  const bool shows = how != Solve::rest || traits.measures_rest;
+  if (Rows::kKeepsRank && shows && !dropped_follow()) {
     uses_.lasting = false;
     if ((found.status = factor(t_, false)) != Status::success) return found;
     blocks_.solve(g_);
@@ -243,7 +243,8 @@ double ContiguousRows<Rows>::judge_thin_rows(double length) {
 // After a move of this length: measures by how much C has turned.
 template <class Rows>
 Status ContiguousRows<Rows>::learn_trust(double length) {
-  return told(blocks_.learn_trust(evaluator_, t_, at_.y.data(), WT_of_differences(), length));
+  return with_message(
+      blocks_.learn_trust(evaluator_, t_, at_.y.data(), WT_of_differences(), length));
 }
 
 // After a solution: whether the dropped rows follow from the kept ones. They are satisfied only

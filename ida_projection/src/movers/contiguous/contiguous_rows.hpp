@@ -103,7 +103,7 @@ class ContiguousRows final : public RowsAt {
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
   void fill_metric() { metric_.fill(at_, blocks_.d, blocks_.a); }
   Block& counted() { return blocks_.d.rows.empty() ? blocks_.a : blocks_.d; }
-  Status told(Status status) {
+  Status with_message(Status status) {
     if (status != Status::success) message = evaluator_.message();
     return status;
   }

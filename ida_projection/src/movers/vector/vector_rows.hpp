@@ -43,19 +43,19 @@ class VectorRows final : public RowsAt {
     return Status::success;
   }
   Status value(double t, bool) override {
-    return fatal_ ? Status::callback_fatal : told(rows_.value(t, y_));
+    return fatal_ ? Status::callback_fatal : with_message(rows_.value(t, y_));
   }
   Status factor(double t, bool refill) override {
     if (refill) metric_.set(at_, dy_);
     factored_ = false;
     if (fatal_) return Status::callback_fatal;
-    Status status = told(rows_.fill(t, y_));
+    Status status = with_message(rows_.fill(t, y_));
     if (status != Status::success) return status;
     if (holds_algebraic_ && rows_.contains_algebraic(id_)) {
       free_all();
       metric_.set(at_, dy_);
     }
-    status = told(rows_.factor(metric_, moves_ ? nullptr : static_cast<N_Vector>(y_)));
+    status = with_message(rows_.factor(metric_, moves_ ? nullptr : static_cast<N_Vector>(y_)));
     factored_ = status == Status::success;
     return status;
   }
@@ -101,7 +101,7 @@ class VectorRows final : public RowsAt {
     if (id == nullptr) return Status::success;
     (void)load(candidate, true);
     if (fatal_) return Status::callback_fatal;
-    const Status status = told(rows_.fill(candidate.t, y_));
+    const Status status = with_message(rows_.fill(candidate.t, y_));
     if (status != Status::success) return status;
     factored_ = false;
     holds_algebraic_ = !rows_.contains_algebraic(id);
@@ -126,7 +126,7 @@ class VectorRows final : public RowsAt {
     metric_.free_all();
   }
   // The rows' own message where they do not succeed.
-  Status told(Status status) {
+  Status with_message(Status status) {
     if (status == Status::success) return status;
     message = rows_.report.text;
     fatal_ |= rows_.report.fatal;

@@ -61,9 +61,9 @@ class MinimumNorm {
               double rank_tolerance);
 
   /// The same with the rows that the last factor() and use_rank() let take part, in their order.
-  /// A A^T = L L^T of these alone takes a fourth to a half of the work. False: an entry
-  /// is not finite, a row depends on those before it but for a sine below 1e-3 or a third of what
-  /// factor() found least. Also where a small system has dropped rows. Then factor() is due.
+  /// A A^T = L L^T of these alone takes less work. Returns false if an entry is not finite, or a
+  /// small system has dropped rows; factor() is due then. So it is if a row depends on those before
+  /// it: the sine of its angle is below 1e-3, or below a third of the least that factor() found.
   bool factor_kept(const double* wide, int width, const int* rows, const int* columns);
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.

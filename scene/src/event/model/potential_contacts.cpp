@@ -10,7 +10,7 @@ namespace tether::scene::event {
 
 namespace {
 
-/// More than these belong to stepping: every contact is looked at in every step.
+/// More than these belong to stepping: every contact is evaluated in every step.
 constexpr std::size_t kMostContacts = 16000;
 constexpr std::size_t kMostMoving = 100;
 

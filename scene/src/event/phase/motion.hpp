@@ -154,7 +154,7 @@ class Motion {
   void leave_energy_free() { keeps_energy_ = false; }  ///< until modes are chosen again
   void keep_energy(double value) { kept_energy_ = value; }
   double kept_energy() const { return kept_energy_; }
-  double energy() const { return model_.energy(); }  ///< of the state that was looked at last
+  double energy() const { return model_.energy(); }  ///< of the state that was evaluated last
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }

@@ -13,7 +13,7 @@ constexpr int kMostIterations = 80;
 constexpr int kPolish = 3;
 constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
-constexpr double kPassing = 0.25;  // of both bodies, from which on a step is looked at in parts
+constexpr double kPassing = 0.25;  // of both bodies, from which on a step is searched in parts
 constexpr int kParts = 32;
 constexpr double kFasterWithin = 2;  // a step, than at its ends
 constexpr double kKnown = 5;         // errors of gaps, in the tolerance of the phase
@@ -313,7 +313,7 @@ double Watcher::way(Phase& phase, const VectorXd& at_end) {
          (phase.step_end() - phase.step_begin());
 }
 
-// Whether a function has a zero between the begin and the end of what is looked at.
+// Whether a function has a zero within the interval that is searched.
 bool Watcher::is_hit(Phase& phase, const Function& f) {
   bool hit = f.value < (f.armed ? 0 : -band(f));
   // Else it is on its way out; its first gaps are lost in rounding.

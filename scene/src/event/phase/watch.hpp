@@ -47,7 +47,7 @@ class Watcher {
     int contact, closed;  // closed: place among the closed contacts
     bool armed, leaving;
     bool dormant;  // a gap that is negative beside its feature: no contact
-    bool far;      // a gap of bodies that are apart: not looked at
+    bool far;      // a gap of bodies that are far apart: not evaluated
     bool was_near;
     double value, before;
     double slope, slope_before;    // of a gap, m/s, or of a slip, m/s^2
@@ -76,7 +76,7 @@ class Watcher {
 
   Motion& motion_;
   std::vector<Function> functions_;
-  double begin_ = 0, end_ = 0;  // the part of the last step that is looked at
+  double begin_ = 0, end_ = 0;  // the part of the last step that is searched
   VectorXd rate_, y_;
   std::vector<std::size_t> waking_;
   double force_ = 0;         // the largest so far

@@ -66,7 +66,7 @@ class Instances {
 const kNone = [1, 0, 0, 0];
 
 class Shapes {
-  // `size` of what is looked at and `reach` of a typical body, which markers are parts of.
+  // `size` of the view and `reach` of a typical body, which markers are parts of.
   constructor(data, size, reach) {
     this.data = data;
     this.forms = data.forms.map(triangles);

@@ -28,7 +28,7 @@ function turnTo(n) {
 
 const kFieldOfView = 0.6;  // rad, of the smaller side
 
-// Looks at `target` from `distance`; angles as in a globe whose axis is `up`.
+// A view of `target` from `distance`; angles as in a globe whose axis is `up`.
 class Camera {
   constructor(up) {
     this.up = unit(up);

@@ -10,8 +10,9 @@ namespace {
 using Row6 = Eigen::Matrix<double, 1, 6>;
 
 constexpr double kRankTolerance = 1e-6;
-// Coefficients of rows of nets reach 1e4: looked at below this, dependent rows of 14 x 14 balls are
-// told as such. One that is not carries a multiplier that nothing determines, and steps collapse.
+// Rows whose independent part is smaller are dependent. In nets of balls coefficients of dependent
+// rows reach 1e4. A dependent row that is kept carries a multiplier that nothing determines, and
+// steps collapse.
 constexpr double kThin = 1e-4;
 
 }  // namespace
