@@ -132,7 +132,7 @@ struct Reader {
     }
   }
 
-  /// `; did you mean ...?`; nothing for problems beyond those shown: each hint looks at all names.
+  /// `; did you mean ...?`; nothing for problems beyond those shown: each hint compares all names.
   template <class Names>
   std::string hint_of(const std::string& wrong, const Names& names) const {
     if (report.full()) return "";
