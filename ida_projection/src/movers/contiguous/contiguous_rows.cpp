@@ -12,7 +12,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kRoundedOneByOne = 32, kSignPatterns = 4;
+constexpr int kSignPatterns = 4;
 constexpr int kMostRateSearches = 16;
 constexpr int kEarly = 64;       // factorisations that belong to the start of a run
 constexpr double kAlike = 0.05;  // relative change of a sum of squares
@@ -344,40 +344,26 @@ bool ContiguousRows<Rows>::rounding_only() {
 }
 
 // Length of the move that the rounding of g asks for in the worst case, with the current factors:
-// at most sum_i |dy_i|, dy_i the move for row i alone. If that would take many solves the bound is
-// sqrt(m sum_i |dy_i|^2), where moves for all rows with random signs estimate the sum of squares.
+// at most sum_i |dy_i|, dy_i the move for row i alone, and so sqrt(m sum_i |dy_i|^2), the sum of
+// squares by moves for all rows with random signs.
 template <class Rows>
 double ContiguousRows<Rows>::rounding_length() {
   kept_g_ = g_;
   const std::vector<double>& g = kept_g_;
-  std::vector<double>& rounding = rounding_;
-  for (int i = 0; i < count(); ++i)
-    rounding[static_cast<std::size_t>(i)] = 8.0 * kEpsilon * blocks_.terms(i, at_.y.data());
-  double total = 0.0;
-  const auto add = [&](auto&& length) {
-    blocks_.solve(g_);
-    total += length(length_of_solution());
-  };
-  if (count() <= kRoundedOneByOne) {
+  std::uint32_t random = 1;
+  double squares = 0.0;
+  for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
     for (std::size_t i = 0; i < g.size(); ++i) {
-      std::fill(g_.begin(), g_.end(), 0.0);
-      g_[i] = rounding[i];
-      add([](double length) { return length; });
+      random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
+      const double rounding = 8.0 * kEpsilon * blocks_.terms(static_cast<int>(i), at_.y.data());
+      g_[i] = random >> 31 != 0 ? rounding : -rounding;
     }
-  } else {
-    std::uint32_t random = 1;
-    for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
-      for (std::size_t i = 0; i < g.size(); ++i) {
-        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
-        g_[i] = random >> 31 != 0 ? rounding[i] : -rounding[i];
-      }
-      add([](double length) { return length * length; });
-    }
-    total = std::sqrt(total / kSignPatterns * count());
+    blocks_.solve(g_);
+    squares += std::pow(length_of_solution(), 2);
   }
   g_ = g;
   blocks_.solve(g_);
-  return total;
+  return std::sqrt(squares / kSignPatterns * count());
 }
 
 template <class Rows>

@@ -38,7 +38,7 @@ class ContiguousRows final : public RowsAt {
         reported_(reported >= 0 ? reported : evaluator_.rows()),
         inverse_n_(1.0 / size) {
     g_.assign(static_cast<std::size_t>(evaluator_.rows()), 0.0);
-    kept_g_ = rounding_ = g_;
+    kept_g_ = g_;
   }
 
   Status load(const Candidate& candidate, bool refills) override;
@@ -142,7 +142,7 @@ class ContiguousRows final : public RowsAt {
   double inverse_n_;
   double t_ = 0.0, length_ = 0.0;  // of the last evaluation and solution
   std::vector<double> g_;
-  std::vector<double> kept_g_, rounding_;  // work space of rounding_length()
+  std::vector<double> kept_g_;              // work space of rounding_length()
   bool rows_known_ = false;                // C belongs to the present y
   bool moved_ = false;                     // this candidate
   int factored_ = 0, rate_searches_ = 0;
