@@ -42,11 +42,12 @@ void measure(const Problem& problem, int batches, int moves) {
   const tp::Constraints constraints = problem.recommended_constraints();
   const tp::Options options;
   tp::Statistics statistics;
-  const auto mover = tp::make_dense_mover(constraints, options, statistics, problem.size);
+  tp::Mover mover(options,
+                  tp::make_contiguous_rows(constraints, options, statistics, problem.size, false));
   tp::Candidate candidate{problem.t0, base, correction, weights};
   candidate.with_entries();
   perturb();
-  mover->rows().set_algebraic(candidate, id);
+  mover.rows().set_algebraic(candidate, id);
 
   double best = 1e300;
   bool success = true;
@@ -59,7 +60,7 @@ void measure(const Problem& problem, int batches, int moves) {
       // become looks.
       constexpr int kRepeat = 16;
       for (int repeat = 0; repeat < kRepeat; ++repeat) {
-        success = mover->move(candidate).status == tp::Status::success && success;
+        success = mover.move(candidate).status == tp::Status::success && success;
         candidate.correction_entries[0] += 0.01 / candidate.weight_entries[0];
       }
       spent +=

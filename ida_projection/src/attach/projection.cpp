@@ -18,12 +18,9 @@ N_Vector vector_of(void* ida_mem) {
 }
 
 std::unique_ptr<Mover> make_mover(const Constraints& constraints, const Options& options,
-                                  Statistics& statistics, N_Vector like, int size) {
+                                  Statistics& statistics, N_Vector like) {
   if (!has_rows(constraints)) return nullptr;
-  if (!has_values(constraints)) return make_vector_mover(constraints, options, statistics, like);
-  return wants_sparse_factors(constraints, size)
-             ? make_sparse_mover(constraints, options, statistics, size)
-             : make_dense_mover(constraints, options, statistics, size);
+  return std::make_unique<Mover>(options, make_rows(constraints, options, statistics, like));
 }
 
 }  // namespace
@@ -48,7 +45,7 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
 
   unknowns_.contiguous = is_contiguous(like);
   unknowns_.count = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
-  movers_.own = make_mover(constraints_, options_, statistics_, like, unknowns_.count);
+  movers_.own = make_mover(constraints_, options_, statistics_, like);
   movers_.used = movers_.own.get();
   if (movers_.used != nullptr) {
     polish_.allocate(like);

@@ -266,12 +266,17 @@ Status Mover::remove_rest(const Candidate& candidate, double reach) {
   return Status::success;
 }
 
-std::unique_ptr<Mover> make_vector_mover(const Constraints& constraints, const Options& options,
-                                         Statistics& statistics, N_Vector like) {
+std::unique_ptr<RowsAt> make_rows(const Constraints& constraints, const Options& options,
+                                  Statistics& statistics, N_Vector like, int reported) {
+  if (has_values(constraints)) {
+    const int size = static_cast<int>(N_VGetLength(like));
+    return make_contiguous_rows(constraints, options, statistics, size,
+                                wants_sparse_factors(constraints, size), reported);
+  }
   MakeRows make = make_user_rows;
   if (const auto* rows = std::get_if<Gradients>(&constraints.jacobian)) make = rows->make;
   if (const auto* rows = std::get_if<DistributedRows>(&constraints.jacobian)) make = rows->make;
-  return std::make_unique<Mover>(options, make(constraints, options, statistics, like));
+  return make(constraints, options, statistics, like);
 }
 
 }  // namespace tether::ida_projection

@@ -119,15 +119,13 @@ class Mover {
   long settles_ = 0;
 };
 
-/// Factories; `size` is N. The options and statistics outlive the mover. Drift is that of the first
-/// `reported` rows (-1: of all).
-std::unique_ptr<Mover> make_dense_mover(const Constraints&, const Options&, Statistics&, int size,
-                                        int reported = -1);
-std::unique_ptr<Mover> make_sparse_mover(const Constraints&, const Options&, Statistics&, int size,
-                                         int reported = -1);
-/// For rows without has_values(), which need no more of a vector than its operations.
-std::unique_ptr<Mover> make_vector_mover(const Constraints&, const Options&, Statistics&,
-                                         N_Vector like);
+/// The storage that suits the rows. The options and statistics outlive it. Drift is that of the
+/// first `reported` rows (-1: of all).
+std::unique_ptr<RowsAt> make_rows(const Constraints&, const Options&, Statistics&, N_Vector like,
+                                  int reported = -1);
+/// The storages of rows on contiguous vectors of `size` unknowns, and of the caller's projection.
+std::unique_ptr<RowsAt> make_contiguous_rows(const Constraints&, const Options&, Statistics&,
+                                             int size, bool sparse, int reported = -1);
 std::unique_ptr<RowsAt> make_user_rows(const Constraints&, const Options&, Statistics&,
                                        N_Vector like);
 

@@ -24,6 +24,7 @@ struct Solution {
   Status status = Status::success;
   double length = 0.0;  ///< WRMS over the variables of the error test, in tolerances
   double left = 0.0;    ///< part of the move that an iterative solution has left
+  int rank = 0;         ///< of Solve::point: rows that take part, if that is known
 };
 
 /// The purpose of a solution.
@@ -31,7 +32,8 @@ enum class Solve {
   first,  ///< the factors are new: which of the rows are to be trusted is decided
   again,  ///< the same rows as before
   rest,   ///< what a move or a polish has left
-  test    ///< no move follows
+  test,   ///< no move follows
+  point   ///< a point far away is looked for: all unknowns count
 };
 
 /// g, C and its factors for the candidate that was loaded last. Newton's loop calls load(),
@@ -108,6 +110,10 @@ class RowsAt {
   virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
     return false;
   }
+
+  /// Moves y' onto C y' + g_t = 0, nearest in the metric, with g_t by central differences. Returns
+  /// false if it was not found.
+  virtual bool tangent(double /*t*/, N_Vector /*yp*/) { return false; }
 
   /// Whether a callback has returned a fatal flag since forget_failure().
   virtual bool fatal() const = 0;

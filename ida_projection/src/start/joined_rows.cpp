@@ -63,9 +63,8 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
   if (found.equations.empty()) return;
   joined_ = constraints_ + as_constraints(
                                found, residual, [this] { return present_.weight_entries; }, size);
-  mover_ = wants_sparse_factors(joined_, size)
-               ? make_sparse_mover(joined_, options_, statistics_, size, rows.rows())
-               : make_dense_mover(joined_, options_, statistics_, size, rows.rows());
+  mover_ = std::make_unique<Mover>(
+      options_, make_rows(joined_, options_, statistics_, candidate.base, rows.rows()));
   mover_->reset();
 }
 

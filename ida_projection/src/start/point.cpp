@@ -5,81 +5,169 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/owned_vector.hpp"
+#include "host/rounding.hpp"
+#include "host/shortest.hpp"
+#include "movers/mover.hpp"
 
 namespace tether::ida_projection {
 
-void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id,
-                              N_Vector weights, ConsistencyReport& report) {
-  if (has_values(constraints_)) return project_values(t, y, hold, id, weights, report);
-  if (!mover_) {
+namespace {
+
+constexpr int kMaximumIterations = 60;
+constexpr double kSmallestDamping = 1.0 / 1024.0;
+constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
+
+}  // namespace
+
+void PointProjection::begin(N_Vector y, N_Vector weights) {
+  if (!rows_) {
     options_ = given_;
     options_.advanced.metric = Metric::error_weights;
-    options_.advanced.largest_move = 1e300;
-    options_.advanced.maximum_iterations = 50;
-    options_.advanced.tolerance = 1e-8;
-    mover_ = make_vector_mover(constraints_, options_, statistics_, y);
+    rows_ = make_rows(constraints_, options_, statistics_, y);
+    for (OwnedVector* each : {&correction_, &weights_, &from_, &dy_}) *each = OwnedVector(y);
   }
-  OwnedVector correction(y);
-  N_VConst(0.0, correction);
-  const Candidate candidate{t, y, correction, weights};
-  mover_->rows().forget_failure();
-  const Move move = mover_->move(candidate);
-  report.status = move.status;
-  report.iterations = move.moves;
-  report.drift_before = move.drift_before;
-  report.drift_after = move.drift_after;
-  if (move.status != Status::success) {
-    report.message = mover_->message();
-    report.contradicting_rows = mover_->rows().contradicting;
-    return;
-  }
-  N_VLinearSum(1.0, y, 1.0, correction, y);
+  N_VConst(0.0, correction_);
+  N_VScale(1.0, weights, weights_);
+  if (!has_values(constraints_)) return;
+  double* w = N_VGetArrayPointer(weights_);
+  for (sunindextype i = 0; i < N_VGetLength(y); ++i)
+    if (!(w[i] > 0.0)) w[i] = 1.0 / std::max(1.0, std::abs(N_VGetArrayPointer(y)[i]));
 }
 
-std::vector<double> PointProjection::tolerances(N_Vector y, N_Vector weights) {
-  const double *values = N_VGetArrayPointer(y), *w = N_VGetArrayPointer(weights);
-  std::vector<double> WT(static_cast<std::size_t>(N_VGetLength(y)));
-  for (std::size_t i = 0; i < WT.size(); ++i)
-    WT[i] = w[i] > 0.0 ? 1.0 / w[i] : std::max(1.0, std::abs(values[i]));
-  return WT;
-}
-
-// Did a callback end the run on the way, perhaps at a trial point?
-bool PointProjection::refused(ConsistencyReport& report) const {
-  if (!nearest_->fatal()) return false;
-  report.status = Status::callback_fatal;
-  report.message = nearest_->message();
-  return true;
-}
-
-GaussNewton& PointProjection::nearest(N_Vector y) {
-  if (!nearest_) nearest_ = make_gauss_newton(constraints_, static_cast<int>(N_VGetLength(y)));
-  return *nearest_;
-}
-
-void PointProjection::project_values(double t, N_Vector y, const std::vector<bool>& hold,
-                                     N_Vector id, N_Vector weights, ConsistencyReport& report) {
-  double* values = N_VGetArrayPointer(y);
-  std::vector<double> point(values, values + N_VGetLength(y));
+// Output points come one after the other: what can move stays, and entries that were zero so far
+// are met by the evaluation of C.
+Status PointProjection::arrange(const Candidate& point, const std::vector<bool>& hold,
+                                N_Vector id) {
+  if (!has_values(constraints_)) return Status::success;
+  const auto n = static_cast<std::size_t>(N_VGetLength(point.base));
+  const double* given = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
+  const std::vector<double> mask(given, given != nullptr ? given + n : given);
   std::vector<bool> held = given_.hold;
   for (std::size_t i = 0; i < hold.size(); ++i)
     if (hold[i]) {
-      held.resize(point.size(), false);
+      held.resize(n, false);
       held[i] = true;
     }
-  nearest(y).project(t, point, tolerances(y, weights), held,
-                     id != nullptr ? N_VGetArrayPointer(id) : nullptr, report);
-  refused(report);
-  if (report.status == Status::success) std::copy(point.begin(), point.end(), values);
+  if (mask == id_ && held == options_.hold) return Status::success;
+  options_.hold = held;
+  const Status status = rows_->set_algebraic(point, id);
+  if (status == Status::success)
+    id_ = mask;
+  else
+    id_.assign(1, -1.0);  // of no point
+  return status;
 }
 
-bool PointProjection::tangent(double t, N_Vector y, N_Vector yp, ConsistencyReport& report) {
-  if (!nearest_) return false;
-  const double* values = N_VGetArrayPointer(y);
-  const bool found =
-      nearest_->tangent(t, {values, values + N_VGetLength(y)}, N_VGetArrayPointer(yp));
-  return !refused(report) && found;
+// The largest s = 1, 1/2, ... for which the natural monotonicity test holds. `left`: length of the
+// simplified next correction. False: there is none, and the point is back where it was.
+bool PointProjection::damped_step(const Candidate& point, double length, double floor,
+                                  double* left) {
+  for (double s = 1.0; s >= kSmallestDamping; s *= 0.5) {
+    N_VLinearSum(1.0, from_, -s, dy_, point.correction);
+    rows_->restart(point);
+    if (rows_->value(point.t, false) != Status::success) {
+      if (rows_->fatal()) return false;
+      continue;
+    }
+    *left = rows_->solve(Solve::point).length;
+    if (*left <= (1.0 - 0.5 * s) * length + floor) return true;
+  }
+  N_VScale(1.0, from_, point.correction);
+  rows_->restart(point);
+  return false;
+}
+
+void PointProjection::newton(const Candidate& point, ConsistencyReport& report) {
+  if ((report.status = rows_->load(point, true)) != Status::success ||
+      (report.status = rows_->value(point.t, true)) != Status::success)
+    return;
+  report.drift_before = rows_->drift();
+  double previous = -1.0;
+  int halvings_in_a_row = 0;
+  for (report.iterations = 0; report.iterations < kMaximumIterations; ++report.iterations) {
+    report.status = rows_->factor(point.t, report.iterations == 0);
+    if (report.status != Status::success) return;
+    const Solution next = rows_->solve(Solve::point);
+    report.rank = next.rank;
+    const double length = next.length;
+    const double floor = 64.0 * kEpsilon * rows_->size();
+    if (length <= std::max(kConverged, floor)) return;
+    // Rounding: small already, and no longer shrinking.
+    if (previous >= 0.0 && length <= 1e4 * floor && length > 0.5 * previous) return;
+    // Gradients that vanish on the set: the distance halves, |g| falls to a quarter.
+    const double rate = previous > 0.0 ? length / previous : 0.0;
+    halvings_in_a_row = rate > 0.4 && rate < 0.6 ? halvings_in_a_row + 1 : 0;
+    if (halvings_in_a_row >= 4) report.slow_convergence = true;
+    previous = length;
+
+    N_VScale(1.0, point.correction, from_);
+    if ((report.status = rows_->apply(1.0, point)) != Status::success) return;
+    if (!rows_->traits.gives_g) {
+      ++report.iterations;
+      return;
+    }
+    N_VLinearSum(1.0, from_, -1.0, point.correction, dy_);
+    double left = 0.0;
+    if (!damped_step(point, length, floor, &left)) {
+      // Almost dependent rows magnify rounding into moves that lead nowhere.
+      report.status = rows_->value(point.t, false);
+      if (report.status == Status::success && !rows_->rounding_only())
+        report.status = Status::not_converged;
+      return;
+    }
+    // Seen with the current factors: others would only confirm it, where no row waits to come back.
+    if (rows_->may_test_with_factors() && left <= std::max(kConverged, floor)) {
+      ++report.iterations;
+      return;
+    }
+  }
+  report.status = Status::not_converged;
+}
+
+// Says what became of newton().
+bool PointProjection::found(ConsistencyReport& report) {
+  report.drift_after = rows_->drift();
+  const bool ended = report.status == Status::success || report.status == Status::not_converged;
+  if (rows_->fatal()) {
+    report.status = Status::callback_fatal;
+    report.message = rows_->message;
+  } else if (!ended) {
+    report.message = rows_->message;
+  } else if (rows_->has_factors() && rows_->contradicts()) {
+    report.status = Status::inconsistent;
+    report.message = rows_->message;
+    report.contradicting_rows = rows_->contradicting;
+  } else if (report.status == Status::not_converged) {
+    report.message = "no point on the constraints was found near the given one: |g| is " +
+                     brief(report.drift_before) + " there and stalls at " +
+                     brief(report.drift_after) +
+                     "; the rows may have no common solution, or the start is too far away";
+  } else if (report.slow_convergence) {
+    report.message =
+        "gradients vanish on the constraints: Newton's method only halves the distance, and |g| "
+        "says little about it; write the rows without squares";
+  }
+  return report.status == Status::success;
+}
+
+void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id,
+                              N_Vector weights, ConsistencyReport& report) {
+  begin(y, weights);
+  Candidate point{t, y, correction_, weights_};
+  if (has_values(constraints_)) point.with_entries();
+  rows_->forget_failure();
+  report.status = arrange(point, hold, id);
+  if (report.status == Status::success) newton(point, report);
+  if (found(report)) N_VLinearSum(1.0, y, 1.0, correction_, y);
+}
+
+bool PointProjection::tangent(double t, N_Vector yp, ConsistencyReport& report) {
+  if (!rows_) return false;
+  const bool along = rows_->tangent(t, yp);
+  if (!rows_->fatal()) return along;
+  report.status = Status::callback_fatal;
+  report.message = rows_->message;
+  return false;
 }
 
 }  // namespace tether::ida_projection

@@ -174,10 +174,25 @@ double ContiguousRows<Rows>::length_of_solution() {
 }
 
 template <class Rows>
+double ContiguousRows<Rows>::length_of_all() const {
+  double sum = 0.0;
+  for (const Block* block : {&blocks_.d, &blocks_.a})
+    for (std::size_t k = 0; k < block->columns.size() && !block->rows.empty(); ++k)
+      sum += std::pow(block->dy[k] * at_.w[block->columns[k]], 2);
+  return wrms(sum);
+}
+
+template <class Rows>
 Solution ContiguousRows<Rows>::solve(Solve how) {
   Solution found;
   blocks_.solve(g_);
   found.length = length_of_solution();
+  if (how == Solve::point) {  // C of another point says nothing about its rows
+    uses_.thin = uses_.lasting = false;
+    found.length = length_of_all();
+    found.rank = blocks_.rank();
+    return found;
+  }
   if (how == Solve::test) --statistics_.iterations;
   if (how == Solve::first && uses_.thin) {
     const double alone = found.length;
@@ -394,16 +409,34 @@ bool ContiguousRows<Rows>::tangency(const std::vector<double>& yp, const double*
   return true;
 }
 
-std::unique_ptr<Mover> make_dense_mover(const Constraints& constraints, const Options& options,
-                                        Statistics& statistics, int size, int reported) {
-  return std::make_unique<Mover>(options, std::make_unique<ContiguousRows<DenseRows>>(
-                                              constraints, options, statistics, size, reported));
+template <class Rows>
+bool ContiguousRows<Rows>::tangent(double t, N_Vector yp) {
+  const double h = std::cbrt(kEpsilon) * std::max(1.0, std::abs(t));
+  std::vector<double> defect(g_), minus(g_);
+  const auto value = [&](double time, std::vector<double>& g) {
+    return told(evaluator_.value(time, at_.y.data(), unknowns(), g.data())) == Status::success;
+  };
+  if (!value(t + h, defect) || !value(t - h, minus) || rows(t, nullptr) != Status::success ||
+      !blocks_.factor())
+    return false;
+  double* const slope = N_VGetArrayPointer(yp);
+  for (std::size_t i = 0; i < g_.size(); ++i)  // a g that does not contain t has no differences
+    defect[i] = (defect[i] - minus[i]) / (2.0 * h) + blocks_.times(static_cast<int>(i), slope);
+  blocks_.solve(defect);
+  for (const Block* block : {&blocks_.d, &blocks_.a})
+    for (std::size_t k = 0; k < block->columns.size() && !block->rows.empty(); ++k)
+      slope[block->columns[k]] -= block->dy[k];
+  return true;
 }
 
-std::unique_ptr<Mover> make_sparse_mover(const Constraints& constraints, const Options& options,
-                                         Statistics& statistics, int size, int reported) {
-  return std::make_unique<Mover>(options, std::make_unique<ContiguousRows<SparseRows>>(
-                                              constraints, options, statistics, size, reported));
+std::unique_ptr<RowsAt> make_contiguous_rows(const Constraints& constraints, const Options& options,
+                                             Statistics& statistics, int size, bool sparse,
+                                             int reported) {
+  if (sparse)
+    return std::make_unique<ContiguousRows<SparseRows>>(constraints, options, statistics, size,
+                                                        reported);
+  return std::make_unique<ContiguousRows<DenseRows>>(constraints, options, statistics, size,
+                                                     reported);
 }
 
 }  // namespace tether::ida_projection

@@ -85,6 +85,7 @@ class ContiguousRows final : public RowsAt {
   }
 
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
+  bool tangent(double t, N_Vector yp) override;
   bool fatal() const override { return evaluator_.fatal(); }
   void forget_failure() override { evaluator_.forget(); }
 
@@ -115,6 +116,7 @@ class ContiguousRows final : public RowsAt {
   Status rows(double t, double* g);
   bool decide();
   double length_of_solution();
+  double length_of_all() const;
   double judge_thin_rows(double length);
   Status learn_trust(double length);
   const std::vector<int>& levels();
@@ -142,9 +144,9 @@ class ContiguousRows final : public RowsAt {
   double inverse_n_;
   double t_ = 0.0, length_ = 0.0;  // of the last evaluation and solution
   std::vector<double> g_;
-  std::vector<double> kept_g_;              // work space of rounding_length()
-  bool rows_known_ = false;                // C belongs to the present y
-  bool moved_ = false;                     // this candidate
+  std::vector<double> kept_g_;  // work space of rounding_length()
+  bool rows_known_ = false;     // C belongs to the present y
+  bool moved_ = false;          // this candidate
   int factored_ = 0, rate_searches_ = 0;
   std::vector<int> found_levels_;
   bool levels_known_ = false;  // they are those of the rows as they are arranged
