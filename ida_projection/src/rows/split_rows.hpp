@@ -35,6 +35,9 @@ class PatternRefresh {
 /// not zero there. WT = 0: unweighted.
 std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
 
+/// Moves of more rows may be rough in the metric, and cost little beside the factors.
+constexpr int kMany = 16;
+
 /// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
 /// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
 /// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.
@@ -51,7 +54,7 @@ class SplitRows {
   /// less than an orthogonal factorisation.
   static constexpr bool kKeepsRank = kDense;
   /// With many rows a second Newton step is cheap beside the factors.
-  static bool many(int rows) { return kDense && rows > linalg::MinimumNorm::kSmallRows; }
+  static bool many(int rows) { return kDense && rows > kMany; }
   /// Dense pivots tell which rows need RowTrust.
   static constexpr bool kThinRows = kDense;
 

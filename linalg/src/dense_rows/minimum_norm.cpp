@@ -1,12 +1,13 @@
 // Tether: minimum-norm solution of C dy = g in a diagonal metric.
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Dense>
+#include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/minimum_norm.hpp>
 
 #include "small_kept_rows.hpp"
-#include "small_orthogonal.hpp"
 
 namespace tether::linalg {
 
@@ -16,10 +17,14 @@ constexpr double kLeastShare = 1.0 / 3.0;  // of factor_kept()
 // Factors of A A^T determine the square of a larger sine to a relative error of 1e-10.
 constexpr double kLeastSine = 1e-3;
 
+// Computes |a| without overflow or underflow.
+double careful_norm(const Eigen::Ref<const Eigen::RowVectorXd>& a) {
+  return a.allFinite() ? a.stableNorm() : std::numeric_limits<double>::quiet_NaN();
+}
+
 }  // namespace
 
-// Factors of more rows than small_orthogonal.hpp takes: A^T P = Q R, or A A^T = L L^T of the rows
-// that take part.
+// A^T P = Q R, or A A^T = L L^T of the rows that take part.
 struct MinimumNorm::Large {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -51,8 +56,8 @@ struct MinimumNorm::Large {
   std::vector<int> order;  // pivot order
 };
 
-MinimumNorm::MinimumNorm() = default;
-MinimumNorm::MinimumNorm(int rows, int columns) { resize(rows, columns); }
+MinimumNorm::MinimumNorm() : large_(std::make_unique<Large>()) {}
+MinimumNorm::MinimumNorm(int rows, int columns) : MinimumNorm() { resize(rows, columns); }
 MinimumNorm::~MinimumNorm() = default;
 MinimumNorm::MinimumNorm(MinimumNorm&&) noexcept = default;
 MinimumNorm& MinimumNorm::operator=(MinimumNorm&&) noexcept = default;
@@ -63,88 +68,61 @@ void MinimumNorm::resize(int rows, int columns) {
                                 ", columns = " + std::to_string(columns) + "; both must be >= 0");
   m_ = rows;
   n_ = columns;
-  kept_ = false;
-  set_rank(0);
+  factors_ = Factors::orthogonal;
+  rank_ = factored_rank_ = 0;
+  least_square_ = 1.0;
   const auto m = static_cast<std::size_t>(rows);
   inconsistency_.assign(m, 0.0);
-  if (rows <= kSmallRows && columns <= kSmallColumns) {
-    kernel_ = &small::kernel_for(columns);
-    if (!small_) small_ = std::make_unique<small::Storage>();
-    if (!small_kept_) small_kept_ = std::make_unique<small::KeptRows>();
-    small_->clear();
-    small_kept_->resize(rows);
-    metric_.assign(static_cast<std::size_t>(kernel_->stride), 0.0);
-  } else {
-    kernel_ = nullptr;
-    metric_.assign(static_cast<std::size_t>(columns), 0.0);
-    row_norm_.assign(m, 0.0);
-    if (!large_) large_ = std::make_unique<Large>();
-    large_->A.resize(rows, columns);
-    large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
-    large_->work.resize(std::max(rows, columns));
-    large_->rhs.resize(std::max(rows, columns));
-    large_->L.resize(rows, rows);
-    large_->order.assign(m, 0);
+  row_norm_.assign(m, 0.0);
+  metric_.assign(static_cast<std::size_t>(columns), 0.0);
+  few_.reset();
+  if (rows > 0 && rows <= small::KeptRows::kRows && columns <= small::KeptRows::kColumns) {
+    few_ = std::make_unique<small::KeptRows>();
+    few_->resize(rows);
   }
+  large_->A.resize(rows, columns);
+  large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
+  large_->work.resize(std::max(rows, columns));
+  large_->rhs.resize(std::max(rows, columns));
+  large_->L.resize(rows, rows);
+  large_->order.resize(m);
+  std::iota(large_->order.begin(), large_->order.end(), 0);
 }
 
-void MinimumNorm::set_rank(int rank) {
-  rank_ = factored_rank_ = rank;
-  least_square_ = 1.0;
-  if (rank > 0)
-    least_square_ = kernel_ != nullptr ? small_->ratio[rank - 1]
-                                       : std::pow(large_->qr.matrixQR()(rank - 1, rank - 1), 2);
-}
-
-double* MinimumNorm::row(int i) {
-  return kernel_ != nullptr ? small_->u + static_cast<std::ptrdiff_t>(i) * kernel_->stride
-                            : large_->A.row(i).data();
-}
+double* MinimumNorm::row(int i) { return large_->A.row(i).data(); }
 
 bool MinimumNorm::factor(const double* D, double rank_tolerance) {
-  for (int j = 0; j < n_; ++j) metric_[static_cast<std::size_t>(j)] = D[j];
-  set_rank(0);
-  kept_ = false;
-  if (kernel_ == nullptr) {
-    for (int i = 0; i < m_; ++i)
-      if (!scale_large(i, i)) return false;
-    return factor_orthogonal(rank_tolerance);
-  }
-  if (!kernel_->form_rows(*small_, m_, metric_.data())) return false;
-  set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
+  metric_.assign(D, D + n_);
+  rank_ = factored_rank_ = 0;
+  for (int i = 0; i < m_; ++i)
+    if (!scale(i, i)) return false;
+  factor_orthogonal(rank_tolerance);
   return true;
 }
 
 bool MinimumNorm::factor(const double* wide, int width, const int* rows, const int* columns,
                          double rank_tolerance) {
-  set_rank(0);
-  kept_ = false;
-  if (kernel_ != nullptr) {
-    if (!kernel_->gather_rows(*small_, m_, n_, wide, width, rows, columns, metric_.data()))
-      return false;
-    set_rank(kernel_->factor(*small_, m_, n_, rank_tolerance));
-    return true;
-  }
+  rank_ = factored_rank_ = 0;
   for (int i = 0; i < m_; ++i) {
-    gather_large(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, i);
-    if (!scale_large(i, i)) return false;
+    gather(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, i);
+    if (!scale(i, i)) return false;
   }
-  return factor_orthogonal(rank_tolerance);
+  factor_orthogonal(rank_tolerance);
+  return true;
 }
 
-void MinimumNorm::gather_large(const double* c, const int* columns, int k) {
+void MinimumNorm::gather(const double* c, const int* columns, int k) {
   double* a = large_->A.row(k).data();
   for (int j = 0; j < n_; ++j) a[j] = c[columns[j]];
 }
 
 // Turns row k of A, which is row i of C, into the unit row of C D. Returns false if an entry is not
 // finite.
-bool MinimumNorm::scale_large(int k, int i) {
+bool MinimumNorm::scale(int k, int i) {
   auto a = large_->A.row(k);
   a = a.cwiseProduct(Eigen::Map<const Eigen::RowVectorXd>(metric_.data(), n_));
   const double square = a.squaredNorm();
-  const double length =
-      square > 1e-280 && square < 1e280 ? std::sqrt(square) : small::careful_norm(a.data(), n_);
+  const double length = square > 1e-280 && square < 1e280 ? std::sqrt(square) : careful_norm(a);
   if (!std::isfinite(length)) return false;
   row_norm_[static_cast<std::size_t>(i)] = length;
   a *= length > std::numeric_limits<double>::min() ? 1.0 / length : 0.0;
@@ -152,53 +130,44 @@ bool MinimumNorm::scale_large(int k, int i) {
 }
 
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
-  if (kernel_ != nullptr) return factor_kept_small({wide, width, rows, columns, metric_.data()});
   const int r = rank_;
-  if (r == 0) return false;
-  if (!kept_) decided_least_ = independent_part(r - 1);
+  if (r == 0 || (few_ != nullptr && r < m_)) return false;
+  if (factors_ == Factors::orthogonal) decided_least_ = independent_part(r - 1);
   if (decided_least_ < kLeastSine) return false;
-  kept_ = false;
-  for (int k = 0; k < m_; ++k) {
-    const int i = pivot(k);
-    gather_large(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, k);
-    if (!scale_large(k, i)) return false;
-  }
-  const double least = large_->factor(r);
-  if (!(least >= std::max(kLeastSine, kLeastShare * decided_least_))) return false;
-  kept_ = true;
-  rank_ = factored_rank_ = r;
-  least_square_ = least * least;
-  return true;
-}
-
-bool MinimumNorm::factor_kept_small(const small::Gathered& from) {
-  if (rank_ == 0 || rank_ < m_) return false;
-  small::Storage& s = *small_;
-  if (!kept_) {
-    decided_least_ = independent_part(rank_ - 1);
-    if (decided_least_ < kLeastSine) return false;
-    for (int k = 0; k < m_; ++k) s.scale[k] = 1.0;
-  }
   const double sine = std::max(kLeastSine, kLeastShare * decided_least_);
-  kept_ = small_kept_->factor(*small_kept_, from, s.pivot, m_, n_, sine * sine, s.square, s.ratio);
-  if (!kept_) {
-    set_rank(0);  // what was known of the rows is overwritten
-    return false;
+  rank_ = factored_rank_ = 0;  // if it fails nothing is known of the rows any more
+  least_square_ = 1.0;
+  if (few_ != nullptr) {
+    const small::Gathered from{wide, width, rows, columns, metric_.data()};
+    if (!few_->factor(*few_, from, large_->order.data(), m_, n_, sine * sine)) return false;
+    for (int k = 0; k < m_; ++k)
+      least_square_ = few_->ratio[k] < least_square_ ? few_->ratio[k] : least_square_;
+    factors_ = Factors::few;
+  } else {
+    for (int k = 0; k < m_; ++k) {
+      const int i = pivot(k);
+      gather(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, k);
+      if (!scale(k, i)) return false;
+    }
+    const double least = large_->factor(r);
+    if (!(least >= sine)) return false;
+    least_square_ = least * least;
+    factors_ = Factors::gram;
   }
-  double least = 1.0;
-  for (int k = 0; k < m_; ++k) least = s.ratio[k] < least ? s.ratio[k] : least;
-  least_square_ = least;
+  rank_ = factored_rank_ = r;
   return true;
 }
 
-bool MinimumNorm::factor_orthogonal(double rank_tolerance) {
+void MinimumNorm::factor_orthogonal(double rank_tolerance) {
   auto& qr = large_->qr;
+  factors_ = Factors::orthogonal;
+  if (m_ == 0 || n_ == 0) return;
   qr.setThreshold(rank_tolerance);
   qr.compute(large_->A.transpose());
   const int* const pivots = qr.colsPermutation().indices().data();
   large_->order.assign(pivots, pivots + m_);
-  set_rank(qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0);
-  return true;
+  rank_ = factored_rank_ = qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0;
+  least_square_ = rank_ > 0 ? std::pow(independent_part(rank_ - 1), 2) : 1.0;
 }
 
 double MinimumNorm::scaled(const double* g, int i) const {
@@ -207,35 +176,15 @@ double MinimumNorm::scaled(const double* g, int i) const {
 }
 
 void MinimumNorm::solve(const double* g, double* dy) {
-  if (kernel_ != nullptr && kept_)
-    small_kept_->solve(*small_kept_, small_->pivot, n_, g, metric_.data(), dy);
+  if (factors_ == Factors::few)
+    few_->solve(*few_, large_->order.data(), n_, g, metric_.data(), dy);
   else
-    kernel_ != nullptr ? solve_small(g, dy) : kept_ ? solve_kept(g, dy) : solve_orthogonal(g, dy);
-}
-
-void MinimumNorm::solve_small(const double* g, double* dy) {
-  const small::Storage& s = *small_;
-  double z[kSmallRows];
-  for (int k = 0; k < m_; ++k) {
-    const int i = s.pivot[k];
-    const double* L = s.L + i * small::Storage::kRows;
-    double left = g[i] * s.scale[i];
-    const int known = std::min(k, rank_);
-    for (int j = 0; j < known; ++j) left -= L[j] * z[j];
-    if (k < rank_) {
-      z[k] = left;
-    } else {
-      const double length = std::sqrt(s.square[i]);
-      inconsistency_[static_cast<std::size_t>(k)] =
-          length > 0.0 ? std::abs(left) / length : std::abs(g[i]);
-    }
-  }
-  kernel_->combine(s, rank_, z, metric_.data(), dy, n_);
+    factors_ == Factors::gram ? solve_gram(g, dy) : solve_orthogonal(g, dy);
 }
 
 // Computes du = A^T (A A^T)^-1 b over the rows that take part. The inconsistency of the others is
 // their entry of |b - A du|.
-void MinimumNorm::solve_kept(const double* g, double* dy) {
+void MinimumNorm::solve_gram(const double* g, double* dy) {
   auto z = large_->rhs.head(rank_);
   for (int k = 0; k < rank_; ++k) z[k] = scaled(g, pivot(k));
   large_->solve(rank_, z);
@@ -271,31 +220,17 @@ void MinimumNorm::solve_orthogonal(const double* g, double* dy) {
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
-int MinimumNorm::pivot(int k) const {
-  return kernel_ != nullptr ? small_->pivot[k] : large_->order[static_cast<std::size_t>(k)];
-}
+int MinimumNorm::pivot(int k) const { return large_->order[static_cast<std::size_t>(k)]; }
 
 double MinimumNorm::row_norm(int i) const {
-  return kernel_ != nullptr ? std::sqrt(small_->square[i]) / small_->scale[i]
-                            : row_norm_[static_cast<std::size_t>(i)];
+  return factors_ == Factors::few ? std::sqrt(few_->square[i])
+                                  : row_norm_[static_cast<std::size_t>(i)];
 }
 
 std::vector<double> MinimumNorm::dependence(int k) const {
   const int r = rank_;
   Eigen::VectorXd x(r);
-  if (kernel_ != nullptr) {
-    // a_k = L_k U and the kept rows are (I + L) U: x = (I + L)^-T L_k^T, then to unit rows.
-    const small::Storage& s = *small_;
-    const auto L = [&](int row, int step) {
-      return s.L[s.pivot[row] * small::Storage::kRows + step];
-    };
-    for (int j = r - 1; j >= 0; --j) {
-      x[j] = L(k, j);
-      for (int i = j + 1; i < r; ++i) x[j] -= L(i, j) * x[i];
-    }
-    const auto length = [&](int row) { return std::sqrt(s.square[s.pivot[row]]); };
-    for (int j = 0; j < r; ++j) x[j] *= length(j) / length(k);
-  } else if (kept_) {
+  if (factors_ == Factors::gram) {
     x = large_->A.topRows(r) * large_->A.row(k).transpose();
     large_->solve(r, x);
   } else {
@@ -306,8 +241,8 @@ std::vector<double> MinimumNorm::dependence(int k) const {
 }
 
 double MinimumNorm::independent_part(int k) const {
-  if (kernel_ != nullptr) return std::sqrt(small_->ratio[k]);
-  return kept_ ? large_->L(k, k) : std::abs(large_->qr.matrixQR()(k, k));
+  if (factors_ == Factors::few) return std::sqrt(few_->ratio[k]);
+  return factors_ == Factors::gram ? large_->L(k, k) : std::abs(large_->qr.matrixQR()(k, k));
 }
 
 double MinimumNorm::condition() const {

@@ -34,7 +34,7 @@ TETHER_INLINE void gather(KeptRows& s, const Gathered& from, const int* order, i
 // A A^T less the products of the columns before it. Rows above the block are skipped.
 template <int Lanes, int Block>
 TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m, int n,
-                                double least, double* square, double* ratio) {
+                                double least) {
   constexpr int kStride = 4 * Lanes, kRest = Lanes - Block;
   for (int a = 4 * Block; a < m && a < 4 * Block + 4; ++a) {
     v4 sum[kRest];
@@ -60,8 +60,8 @@ TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m,
       reinterpret_cast<v4*>(s.L + a * kStride)[Block + v] = sum[v] * inverse;
     }
     s.inverse[a] = inverse;
-    square[order[a]] = whole;
-    ratio[a] = d / whole;
+    s.square[order[a]] = whole;
+    s.ratio[a] = d / whole;
     // Written so that NaN fails, too.
     if (!(whole > kSmallestSquare && whole < kLargestSquare && d >= least * whole)) return false;
   }
@@ -72,7 +72,7 @@ TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m,
 // L is loaded from memory just after it was stored.
 template <int Rows>
 TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* order, int n,
-                              double least, double* square, double* ratio) {
+                              double least) {
   const double* c[4];
   for (int k = 0; k < 4; ++k)
     c[k] = from.wide + static_cast<std::ptrdiff_t>(from.rows[order[k < Rows ? k : 0]]) * from.width;
@@ -95,8 +95,8 @@ TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* orde
     L[a] = U[a] * inverse;
     reinterpret_cast<v4*>(s.L)[a] = L[a];
     s.inverse[a] = inverse;
-    square[order[a]] = whole;
-    ratio[a] = d / whole;
+    s.square[order[a]] = whole;
+    s.ratio[a] = d / whole;
     // Written so that NaN fails, too.
     good &= whole > kSmallestSquare && whole < kLargestSquare && d >= least * whole;
   }
@@ -105,23 +105,20 @@ TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* orde
 
 template <int Lanes>
 TETHER_INLINE bool factor(KeptRows& s, const Gathered& from, const int* order, int m, int n,
-                          double least, double* square, double* ratio) {
+                          double least) {
   alignas(32) double U[4 * Lanes * 4 * Lanes];
   gather<Lanes>(s, from, order, m, n);
-  bool good = factor_block<Lanes, 0>(s, U, order, m, n, least, square, ratio);
-  if constexpr (Lanes > 1)
-    good = good && factor_block<Lanes, 1>(s, U, order, m, n, least, square, ratio);
-  if constexpr (Lanes > 2)
-    good = good && factor_block<Lanes, 2>(s, U, order, m, n, least, square, ratio);
-  if constexpr (Lanes > 3)
-    good = good && factor_block<Lanes, 3>(s, U, order, m, n, least, square, ratio);
+  bool good = factor_block<Lanes, 0>(s, U, order, m, n, least);
+  if constexpr (Lanes > 1) good = good && factor_block<Lanes, 1>(s, U, order, m, n, least);
+  if constexpr (Lanes > 2) good = good && factor_block<Lanes, 2>(s, U, order, m, n, least);
+  if constexpr (Lanes > 3) good = good && factor_block<Lanes, 3>(s, U, order, m, n, least);
   return good;
 }
 
 #define TETHER_FACTOR(Lanes)                                                                    \
   TETHER_CLONES bool factor_##Lanes(KeptRows& s, const Gathered& from, const int* order, int m, \
-                                    int n, double least, double* square, double* ratio) {       \
-    return factor<Lanes>(s, from, order, m, n, least, square, ratio);                           \
+                                    int n, double least) {                                      \
+    return factor<Lanes>(s, from, order, m, n, least);                                          \
   }
 TETHER_FACTOR(2)
 TETHER_FACTOR(3)
@@ -130,8 +127,8 @@ TETHER_FACTOR(4)
 
 #define TETHER_FACTOR_FEW(Rows)                                                                  \
   TETHER_CLONES bool factor_few_##Rows(KeptRows& s, const Gathered& from, const int* order, int, \
-                                       int n, double least, double* square, double* ratio) {     \
-    return factor_few<Rows>(s, from, order, n, least, square, ratio);                            \
+                                       int n, double least) {                                    \
+    return factor_few<Rows>(s, from, order, n, least);                                           \
   }
 TETHER_FACTOR_FEW(1)
 TETHER_FACTOR_FEW(2)

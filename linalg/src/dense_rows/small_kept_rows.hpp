@@ -21,6 +21,7 @@ struct KeptRows {
   alignas(32) double A[kColumns * kRows];  // A(k, j) at [j * stride + k]
   alignas(32) double L[kRows * kRows];     // L(i, k), i > k, at [k * stride + i]
   double inverse[kRows];                   // 1 / d_k
+  double square[kRows], ratio[kRows];      // of factor()
 
   /// Rows take `stride(m)` places in a column.
   static constexpr int stride(int m) { return (m + 3) / 4 * 4; }
@@ -30,7 +31,7 @@ struct KeptRows {
   /// d_k / |a_k|^2. False: an entry is not finite, a length may overflow, or a ratio is below
   /// `least`.
   using Factor = bool (*)(KeptRows& s, const Gathered& from, const int* order, int m, int n,
-                          double least, double* square, double* ratio);
+                          double least);
   /// dy = D A^T (A A^T)^-1 g; g in the caller's order of rows.
   using Solve = void (*)(const KeptRows& s, const int* order, int n, const double* g,
                          const double* D, double* dy);

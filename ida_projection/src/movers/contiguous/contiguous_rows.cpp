@@ -150,7 +150,7 @@ Status ContiguousRows<Rows>::factor(double t, bool refill) {
 template <class Rows>
 bool ContiguousRows<Rows>::decide() {
   ++statistics_.factorizations;
-  if (count() > kFewForLevels) find_rates();
+  if (count() > kMany) find_rates();
   if (!blocks_.factor()) return false;
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kThinRows)

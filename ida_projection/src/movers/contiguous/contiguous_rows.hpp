@@ -17,7 +17,6 @@
 
 namespace tether::ida_projection {
 
-constexpr int kFewForLevels = 16;  // rows
 constexpr double kFollows = 0.25;  // of Options::tolerance: dropped rows may ask for such a move
 
 /// `Rows` keeps C and its factors: DenseRows or SparseRows.
@@ -28,7 +27,7 @@ class ContiguousRows final : public RowsAt {
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, int reported)
       : RowsAt({true, Rows::many(constraints.total_count()),
-                constraints.total_count() > kFewForLevels || Rows::kSparse}),
+                constraints.total_count() > kMany || Rows::kSparse}),
         evaluator_(constraints, statistics),
         blocks_(constraints, evaluator_, size),
         at_(size),
@@ -81,7 +80,7 @@ class ContiguousRows final : public RowsAt {
   // Few rows make no rough moves. At singular positions, where rows are nearly dependent, F
   // responds to any move, stiff or not.
   bool may_use_levels() const override {
-    return count() > kFewForLevels && !uses_.thin && !blocks_.dropped_rows();
+    return count() > kMany && !uses_.thin && !blocks_.dropped_rows();
   }
 
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;

@@ -10,10 +10,7 @@ TETHER_EXPORT_BEGIN
 namespace tether::linalg {
 
 namespace small {  // inside the library
-struct Storage;
-struct Kernel;
 struct KeptRows;
-struct Gathered;
 }  // namespace small
 
 /// Factors of an m x n matrix C in the metric D, kept until the next factor():
@@ -25,14 +22,10 @@ struct Gathered;
 /// then dy = D Q [R11^-T (P^T S g)_1..r; 0]. Because the rows are unit vectors, the rank decision
 /// |R_kk| > rank_tolerance does not depend on the units of g. A A^T is not formed for it.
 ///
-/// Up to 16 x 32: Gram-Schmidt with reorthogonalisation in loops of fixed length; beyond that
-/// Eigen's ColPivHouseholderQR. Many rows of few entries are for SparseMinimumNorm. resize()
-/// allocates, factor() and solve() do not.
+/// Many rows of few entries are for SparseMinimumNorm. resize() allocates, factor() and solve() do
+/// not.
 class MinimumNorm {
  public:
-  static constexpr int kSmallRows = 16;     ///< most rows of the loops of fixed length
-  static constexpr int kSmallColumns = 32;  ///< and most columns
-
   MinimumNorm();                       ///< 0 x 0
   MinimumNorm(int rows, int columns);  ///< resize(rows, columns)
   ~MinimumNorm();
@@ -95,28 +88,22 @@ class MinimumNorm {
   double condition() const;
 
  private:
-  void set_rank(int rank);
-  void gather_large(const double* c, const int* columns, int k);
-  bool scale_large(int k, int i);
-  bool factor_orthogonal(double rank_tolerance);
-  bool factor_kept_small(const small::Gathered& from);
-  void solve_kept(const double* g, double* dy);
+  enum class Factors { orthogonal, gram, few };
+  void gather(const double* c, const int* columns, int k);
+  bool scale(int k, int i);
+  void factor_orthogonal(double rank_tolerance);
+  void solve_gram(const double* g, double* dy);
   void solve_orthogonal(const double* g, double* dy);
-  void solve_small(const double* g, double* dy);
   double scaled(const double* g, int i) const;
 
   int m_ = 0, n_ = 0, rank_ = 0, factored_rank_ = 0;
-  const small::Kernel* kernel_ = nullptr;  // null: beyond the small sizes
-  std::unique_ptr<small::Storage> small_;
-  std::unique_ptr<small::KeptRows> small_kept_;  // of factor_kept()
   struct TETHER_HIDDEN Large;  // Eigen's types stay inside the library: see eigen.hpp
   std::unique_ptr<Large> large_;
-  bool kept_ = false;  // the factors are those of factor_kept()
+  std::unique_ptr<small::KeptRows> few_;  // of factor_kept(); null: beyond its sizes
+  Factors factors_ = Factors::orthogonal;
   double least_square_ = 1.0;
   double decided_least_ = 1.0;  // least independent part of the rows at the last factor()
-  std::vector<double> metric_;  // D, padded with zeros to the kernel's stride
-
-  std::vector<double> row_norm_, inconsistency_;
+  std::vector<double> metric_, row_norm_, inconsistency_;  // metric_: D
 };
 
 }  // namespace tether::linalg
