@@ -205,3 +205,22 @@ TEST_CASE("cost compares what the scene's law allows, and says why not") {
   CHECK(other.no_events.find("Newton") != std::string::npos);
   CHECK(other.rows.size() == 2);
 }
+
+TEST_CASE("cost goes on where a spring is too stiff for the longest steps") {
+  CostOptions few;
+  few.steps = {4e-2, 2e-3};
+  few.samples = 50;
+  const CostTable table = cost(
+      parse_scene("[scene]\n" + kHead +
+                      "[[body]]\nshape = \"sphere\"\nradius = 0.1\nmass = 1\nposition = [0, 0, "
+                      "0.6]\nmaterial = \"a\"\n[[body]]\nshape = \"plane\"\nfixed = true\nmaterial "
+                      "= \"a\"\n[[pair]]\nbetween = [\"a\", \"a\"]\n[[spring]]\nbodies = [\"body "
+                      "1\", \"world\"]\nat = [[0, 0, 0.6], [0, 0, 1]]\nstiffness = 1e4\nrest = "
+                      "0.4\n",
+                  "test"),
+      few);
+  REQUIRE(table.rows.size() == 2);
+  CHECK(table.rows[0].failure.find("too long for it to be stable") != std::string::npos);
+  CHECK(table.rows[1].failure == "");
+  CHECK(table.rows[1].error < 0.1);
+}

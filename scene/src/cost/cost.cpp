@@ -109,7 +109,13 @@ CostRow measure_row(const Scene& scene, Setting setting, const std::vector<doubl
   CostRow row;
   row.method = setting.method;
   row.setting = setting.value;
-  const Measured m = measure_once(scene, times, options);
+  Measured m;
+  try {
+    m = measure_once(scene, times, options);
+  } catch (const std::invalid_argument& refused) {  // as a step for which a spring is too stiff
+    row.failure = refused.what();
+    return row;
+  }
   const RunResult& r = m.result;
   row.failure = r.failure;
   // On the safe side: the error of the reference may add to the difference found.
