@@ -22,7 +22,6 @@ using Clock = std::chrono::steady_clock;
 constexpr long kSampleEvery = 16;
 constexpr double kSudden = 10.0;     // times the last accepted move: longer ones follow a jump of F
 constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
-constexpr double kShortMove = 1.0;   // tolerances: after a longer move the polish comes second
 
 }  // namespace
 
@@ -222,9 +221,8 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
 // test of algebraic variables needs the response.
 bool Projection::Impl::polishes_first() {
   if (!movers_.used->rows().traits.many) return false;
-  const double longest =
-      std::min(kShortMove, polish_.longest_without_response(control_.smoothing()));
-  if (!in_use(Mechanism::polish_first) || !(attempts_.last_move <= longest) ||
+  if (!in_use(Mechanism::polish_first) ||
+      attempts_.last_move > polish_.longest_without_response(control_.smoothing()) ||
       control_.tests_algebraic() || !movers_.used->rows().may_polish_first())
     return false;
   const bool silent = metric_choice_.calm() || !may_change_metric();

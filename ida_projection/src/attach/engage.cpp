@@ -14,8 +14,7 @@ namespace tether::ida_projection {
 namespace {
 
 // Setpoint for multipliers of index 2 (method, section 7), see setpoint_of_high_index().
-constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4,
-                 kLargestFactor = 5.0, kManyFree = 0.4;
+constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kManyFree = 0.4;
 constexpr int kFew = 16;               // unknowns per row from which on rows are few
 constexpr double kNeedsNoMove = 1e-8;  // tolerances: a shorter first move does not begin the policy
 
@@ -107,7 +106,7 @@ SetpointFactors Projection::Impl::setpoint_of_high_index(const Candidate& candid
   const double differential = N_VDotProd(id, id);
   if (constraints_.total_count() > (1.0 - kManyFree) * differential) return usual;
   const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
-  const double tighter = std::clamp(std::pow(kProportional * unknowns, 0.2), 1.0, kLargestFactor);
+  const double tighter = std::max(1.0, std::pow(kProportional * unknowns, 0.2));
   return {kAsideFromTest * tighter, kAtLowOrders * tighter * tighter};
 }
 

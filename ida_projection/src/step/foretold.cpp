@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kUnseen = 0.003;   // tolerances: allowed error of a forecast delta
 constexpr double kNotStiff = 0.03;  // tolerances: |delta + kappa ycor| up to which F is not stiff
-constexpr int kWait = 30;
 
 }  // namespace
 
@@ -26,13 +25,7 @@ double PolishForecast::share_of(N_Vector weights, N_Vector ycor, N_Vector delta)
   return square > 0.0 ? N_VDotProd(work_, delta) / square : 0.0;
 }
 
-void PolishForecast::doubt() {
-  wait_ = kWait;
-  forget();
-}
-
 void PolishForecast::learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
-  if (wait_ > 0) --wait_;
   const bool learnt = known(cj);
   if (learnt) {
     N_VLinearSum(1.0, delta, -share_at(cj), ycor, work_);

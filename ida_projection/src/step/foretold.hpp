@@ -18,14 +18,10 @@ class PolishForecast {
     cj_at_setup_ = cj;
     forget();
   }
-  /// A corrector failed: the next polishes are computed.
-  void doubt();
   /// Learns from a computed delta.
   void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj);
   /// Whether delta can be forecast for a correction with this cj.
-  bool can_forecast(double cj) const {
-    return used_in_row_ < allowance_ && wait_ == 0 && known(cj);
-  }
+  bool can_forecast(double cj) const { return used_in_row_ < allowance_ && known(cj); }
   void tell(double cj, N_Vector ycor, N_Vector delta) const {
     N_VLinearSum(share_at(cj), ycor, 1.0, beyond_, delta);
   }
@@ -47,7 +43,6 @@ class PolishForecast {
   double share_ = 0.0;      // delta was share ycor + beyond
   bool not_stiff_ = false;  // and next to -kappa ycor
   int allowance_ = 0, used_in_row_ = 0;
-  int wait_ = 0;  // iterations until it is foretold again
 };
 
 }  // namespace tether::ida_projection

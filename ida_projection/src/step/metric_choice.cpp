@@ -7,7 +7,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kFirstMeasurements = 16;  // in a row, as a start excites stiff components
 constexpr int kPause = 8, kLongestWait = 64;
 constexpr double kPart = 0.1;    // of a move: a smaller response needs no stiff components
 constexpr double kHarm = 1e-4;   // tolerances: a shorter response does no harm
@@ -33,10 +32,7 @@ bool MetricChoice::doubts(const MoveAndResponse& at) {
 
 void MetricChoice::pause() {
   calm_ = false;
-  if (measurements_ < kFirstMeasurements)
-    ++measurements_;
-  else
-    pause_ = kPause;
+  pause_ = kPause;
 }
 
 bool MetricChoice::prefers(const MoveAndResponse& other, const MoveAndResponse& present) {

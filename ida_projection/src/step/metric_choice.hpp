@@ -33,7 +33,6 @@ class MetricChoice {
  private:
   static constexpr int kFirstWait = 2;
   bool by_levels_ = false, calm_ = false;
-  int measurements_ = 0;        // that found nothing
   int pause_ = 0;               // moves until the next measurement
   int wait_ = 0;                // stiff responses until the next trial
   int next_wait_ = kFirstWait;  // after one that changed nothing

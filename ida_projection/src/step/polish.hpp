@@ -42,7 +42,7 @@ class Polish {
     if (forecast_) forecast_->renewed(cj);
   }
   void corrector_failed() {
-    if (forecast_) forecast_->doubt();
+    if (forecast_) forecast_->forget();
   }
   /// Allows forecasts: every correction of the one vector is polished.
   void allow_forecasts() { forecast_.emplace(delta_); }
