@@ -56,8 +56,8 @@ struct BodyOptions {
   /// Largest number of contacts of an island that may be assembled and given to Solver, whose
   /// stages also solve stacks, large mass ratios and high friction. That happens where the work
   /// predicted from the contact graph is less than that of the remaining sweeps, or sweeps have
-  /// ended, and max_work allows it. An attempt has a share of the work of the sweeps, which go on
-  /// where it fails. Bounds the memory: 1.3 kB a contact in a packing, 20 to 30 kB with a
+  /// ended, and max_work allows it. Sweeps go on where an attempt fails, and the next one has more
+  /// work. Bounds the memory: 1.3 kB a contact in a packing, 20 to 30 kB with a
   /// factorisation. 0: never.
   int max_assembled = 100000;
   bool strict = false;    ///< as Options::strict, for assembled islands
