@@ -1,13 +1,11 @@
 // Tether: which metric moves are made in. SPDX-License-Identifier: BSD-3-Clause
 #include "step/metric_choice.hpp"
 
-#include <algorithm>
-
 namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kPause = 8, kLongestWait = 64;
+constexpr int kPause = 8;
 constexpr double kPart = 0.1;    // of a move: a smaller response needs no stiff components
 constexpr double kHarm = 1e-4;   // tolerances: a shorter response does no harm
 constexpr double kBetter = 0.5;  // of move and response: the other metric is taken below it
@@ -46,7 +44,7 @@ bool MetricChoice::prefers(const MoveAndResponse& other, const MoveAndResponse& 
 
 void MetricChoice::found_none() {
   wait_ = next_wait_;
-  next_wait_ = std::min(2 * next_wait_, kLongestWait);
+  next_wait_ *= 2;
 }
 
 }  // namespace tether::ida_projection

@@ -31,11 +31,10 @@ class MetricChoice {
   bool by_levels() const { return by_levels_; }  ///< the present metric
 
  private:
-  static constexpr int kFirstWait = 2;
   bool by_levels_ = false, calm_ = false;
-  int pause_ = 0;               // moves until the next measurement
-  int wait_ = 0;                // stiff responses until the next trial
-  int next_wait_ = kFirstWait;  // after one that changed nothing
+  int pause_ = 0;      // moves until the next measurement
+  int wait_ = 0;       // stiff responses until the next trial
+  int next_wait_ = 2;  // after one that changed nothing
 };
 
 }  // namespace tether::ida_projection

@@ -17,7 +17,7 @@ constexpr double kLogSmall = -1.2;                            // 0.3
 constexpr int kSamples = 6;                                   // in the mean of log r
 constexpr double kWorth = 0.5;                                // of the step before it
 constexpr long kFirstSteps = 60;                              // a start excites what is stiff
-constexpr long kFirstWait = 100;  // steps, after a limit that did not pay
+constexpr long kWait = 100;  // steps, after a limit that did not pay
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
 constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
@@ -28,7 +28,6 @@ void OrderLimit::reset() {
   end();
   now_ = State();
   now_.on = options_.advanced.limit_order;
-  now_.wait = kFirstWait;
 }
 
 void OrderLimit::end() {
@@ -128,7 +127,7 @@ void OrderLimit::judge(long steps, double t) {
   now_.phase = Phase::watching;
   now_.samples = 0;
   now_.pending_steps = -1;
-  if (shorter) now_.not_before = steps + std::exchange(now_.wait, 4 * now_.wait);
+  if (shorter) now_.not_before = steps + kWait;
   if (!shorter) now_.trial *= 2;
 }
 

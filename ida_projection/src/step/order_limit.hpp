@@ -74,7 +74,7 @@ class OrderLimit {
     long since = 0;                           // steps when it was judged last
     long trial = 40;                          // steps with the limit until it is judged
     double t_since = 0.0;
-    long not_before = 0, wait = 0;  // steps; after a limit that made the steps shorter
+    long not_before = 0;  // steps; after a limit that made the steps shorter
   };
 
   void* ida_mem_;
