@@ -8,6 +8,7 @@
 #include "attach/impl.hpp"
 #include "fast/kernels.hpp"
 #include "host/mechanisms.hpp"
+#include "host/rounding.hpp"
 
 namespace tether::ida_projection {
 
@@ -15,8 +16,7 @@ namespace {
 
 // Setpoint for multipliers of index 2 (method, section 7), see setpoint_of_high_index().
 constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kManyFree = 0.4;
-constexpr int kFew = 16;               // unknowns per row from which on rows are few
-constexpr double kNeedsNoMove = 1e-8;  // tolerances: a shorter first move does not begin the policy
+constexpr int kFew = 16;  // unknowns per row from which on rows are few
 
 }  // namespace
 
@@ -131,7 +131,7 @@ std::optional<int> Projection::Impl::measure_before_engaging(const Candidate& ca
     // In the first step rows that contradict each other do so at every step size.
     return attempts_.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
   }
-  if (first.length <= std::max(kNeedsNoMove, first.floor) && !control_.struggling()) {
+  if (first.length <= std::max(kNothing, first.floor) && !control_.struggling()) {
     ++statistics_.skipped;
     statistics_.largest_drift_before =
         std::max(statistics_.largest_drift_before, first.drift_before);

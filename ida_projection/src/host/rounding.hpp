@@ -1,4 +1,4 @@
-// Tether: the size of rounding. SPDX-License-Identifier: BSD-3-Clause
+// Tether: sizes that count as none. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <limits>
@@ -6,5 +6,6 @@
 namespace tether::ida_projection {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kNothing = 1e-8;  ///< tolerances: a shorter move counts as none
 
 }  // namespace tether::ida_projection

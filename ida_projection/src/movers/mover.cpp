@@ -11,7 +11,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kNothing = 1e-8;         // tolerances: a shorter move counts as none
 constexpr double kLargestFloor = 0.1;     // tolerances
 constexpr double kStaleRowsSafety = 4.0;  // factor for C of an earlier step
 constexpr int kMostTests = 16;            // candidates tested with the factors of an earlier one

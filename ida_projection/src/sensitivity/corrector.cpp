@@ -15,8 +15,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kOnTangent = 1e-8;  // tolerances: a shorter move is not made
-constexpr int kFewRows = 64;         // factors for each sensitivity
+constexpr int kFewRows = 64;  // factors for each sensitivity
 
 /// The content of an N_VectorSensWrapper, the Ns vectors that IDAS corrects together. SUNDIALS
 /// declares it in sundials_nvector_senswrapper.h, which Debian does not ship; it is the same from
@@ -337,7 +336,7 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
   if (status != Status::success) return status;
   if (!engaged_) {
     const double floor = 4.0 * kEpsilon * N_VWrmsNorm(candidate.base, candidate.weights);
-    if (length <= std::max(kOnTangent, floor)) return Status::success;
+    if (length <= std::max(kNothing, floor)) return Status::success;
     engaged_ = true;
   }
   if (length > state_.options_.advanced.largest_move)

@@ -2,28 +2,11 @@
 #include <algorithm>
 #include <iterator>
 
+#include "host/shortest.hpp"
 #include "start/algebraic.hpp"
 #include "start/nearby_residuals.hpp"
 
 namespace tether::ida_projection {
-
-namespace {
-
-constexpr std::size_t kNamed = 6;  // the others are counted
-
-std::string list(const std::vector<int>& variables) {
-  std::string out;
-  const std::size_t shown = std::min(variables.size(), kNamed);
-  for (std::size_t k = 0; k < shown; ++k)
-    out += (k == 0                     ? "y["
-            : k + 1 < variables.size() ? ", y["
-                                       : " and y[") +
-           std::to_string(variables[k]) + "]";
-  if (shown < variables.size()) out += " and " + std::to_string(variables.size() - shown) + " more";
-  return out;
-}
-
-}  // namespace
 
 const std::string& AlgebraicVariables::doubts(const Candidate& candidate, Corrector& corrector,
                                               double cj) {
@@ -32,12 +15,12 @@ const std::string& AlgebraicVariables::doubts(const Candidate& candidate, Correc
   std::string& text = found_.doubts;
   std::vector<int> moving = with_derivative(candidate, corrector, cj);
   if (!moving.empty())
-    text = "the id vector calls " + list(moving) +
+    text = "the id vector calls " + listed(moving) +
            " algebraic, but F contains the derivative: 1 stands for differential variables, 0 for "
            "algebraic ones (Options::id)";
   if (!found_.without_derivative.empty())
     text += (text.empty() ? "the id vector calls " : "; it calls ") +
-            list(found_.without_derivative) +
+            listed(found_.without_derivative) +
             " differential, but F does not contain the derivative: 0 stands for algebraic "
             "variables (Options::id)";
   return text;

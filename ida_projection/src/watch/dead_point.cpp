@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/shortest.hpp"
 #include "start/nearby_residuals.hpp"
 #include "start/undetermined_columns.hpp"
 
@@ -14,17 +15,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr std::size_t kMostVariables = 200;
-constexpr double kChange = 1e-3;   // of max(1, |y_j|)
-constexpr std::size_t kNamed = 6;  // the others are counted
-
-std::string list(const std::vector<std::string>& names) {
-  std::string out;
-  const std::size_t shown = std::min(names.size(), kNamed);
-  for (std::size_t k = 0; k < shown; ++k)
-    out += (k == 0 ? "" : k + 1 < names.size() ? ", " : " and ") + names[k];
-  if (shown < names.size()) out += " and " + std::to_string(names.size() - shown) + " more";
-  return out;
-}
+constexpr double kChange = 1e-3;  // of max(1, |y_j|)
 
 }  // namespace
 
@@ -50,14 +41,14 @@ std::string undetermined_multipliers(const Candidate& candidate, N_Vector y,
                     slopes.col(static_cast<Eigen::Index>(k))))
       return {};
   const std::vector<char> found = undetermined_columns(std::move(slopes), false);
-  std::vector<std::string> free;
+  std::vector<int> free;
   for (std::size_t k = 0; k < found.size(); ++k)
-    if (found[k]) free.push_back("y[" + std::to_string(algebraic[k]) + "]");
+    if (found[k]) free.push_back(algebraic[k]);
   if (free.empty()) return {};
   const std::vector<std::string> rows = faults.dependent(candidate.t, at, WT);
-  return "F does not determine the algebraic variables " + list(free) +
+  return "F does not determine the algebraic variables " + listed(free) +
          ": its derivatives by them depend on each other" +
-         (rows.empty() ? "" : ", as do the rows " + list(rows)) +
+         (rows.empty() ? "" : ", as do the rows " + listed(rows)) +
          "; at a dead point of a mechanism start beside it, joints that are there twice leave out";
 }
 
