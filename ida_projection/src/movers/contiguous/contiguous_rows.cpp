@@ -414,7 +414,8 @@ bool ContiguousRows<Rows>::tangent(double t, N_Vector yp) {
   const double h = std::cbrt(kEpsilon) * std::max(1.0, std::abs(t));
   std::vector<double> defect(g_), minus(g_);
   const auto value = [&](double time, std::vector<double>& g) {
-    return with_message(evaluator_.value(time, at_.y.data(), unknowns(), g.data())) == Status::success;
+    return with_message(evaluator_.value(time, at_.y.data(), unknowns(), g.data())) ==
+           Status::success;
   };
   if (!value(t + h, defect) || !value(t - h, minus) || rows(t, nullptr) != Status::success ||
       !blocks_.factor())
