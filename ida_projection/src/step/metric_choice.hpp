@@ -13,24 +13,51 @@ class MetricChoice {
  public:
   void reset() { *this = MetricChoice(); }
   /// Whether the response to the present move is to be measured.
-  bool due();
+  bool due() {
+    if (pause_ > 0) --pause_;
+    return pause_ == 0;
+  }
   /// Whether the next move needs no measurement, since the last one found nothing.
   bool calm() const { return calm_ && pause_ > 1; }
   /// Whether stiff components respond so much that it harms.
-  bool stiff(const MoveAndResponse& at) const;
+  bool stiff(const MoveAndResponse& at) const {
+    return at.response > kPart * at.move && at.response > kHarm;
+  }
   /// After a measurement: whether they do and the other metric is to be tried.
-  bool doubts(const MoveAndResponse& at);
+  bool doubts(const MoveAndResponse& at) {
+    if (stiff(at)) return wait_ == 0 || --wait_ == 0;
+    pause();
+    calm_ = true;
+    return false;
+  }
   /// After that trial: whether the other metric is used from now on.
-  bool prefers(const MoveAndResponse& other, const MoveAndResponse& present);
-  /// Whether the other metric may be tried again.
-  bool may_try() { return wait_ == 0 || --wait_ == 0; }
+  bool prefers(const MoveAndResponse& other, const MoveAndResponse& present) {
+    const bool better = other.move + other.response <= kBetter * (present.move + present.response);
+    if (better)
+      by_levels_ = !by_levels_;
+    else
+      found_none();
+    return better;
+  }
   /// Nothing can be done about the response: measure again later.
-  void pause();
+  void pause() {
+    calm_ = false;
+    pause_ = kPause;
+  }
   /// There is no other metric, or its move failed.
-  void found_none();
+  void found_none() {
+    wait_ = next_wait_;
+    next_wait_ *= 2;
+  }
   bool by_levels() const { return by_levels_; }  ///< the present metric
 
  private:
+  static constexpr int kPause = 8;       // moves
+  static constexpr double kPart = 0.1;   // of a move: a smaller response needs no stiff components
+  static constexpr double kHarm = 1e-4;  // tolerances: a shorter response does no harm
+  static constexpr double kBetter =
+      0.5;  // of move and response: the other metric is taken below it
+
   bool by_levels_ = false, calm_ = false;
   int pause_ = 0;      // moves until the next measurement
   int wait_ = 0;       // stiff responses until the next trial
