@@ -19,7 +19,8 @@ diff "$work/shown" "$work/real" || {
   exit 1
 }
 
-sed -n '/^```cpp$/,/^```$/p' "$readme" | sed '1d;/^```$/,$d' >"$work/lines"
+# A line may explain itself by a comment at its end.
+sed -n '/^```cpp$/,/^```$/p' "$readme" | sed '1d;/^```$/,$d;s| *//.*||' >"$work/lines"
 [ -s "$work/lines" ] || { echo "$readme has no cpp block" >&2; exit 1; }
 while IFS= read -r line; do
   grep -qxF -- "$line" after.cpp || { echo "README.md shows a line that is not in after.cpp: $line" >&2; exit 1; }

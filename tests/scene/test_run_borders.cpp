@@ -119,7 +119,7 @@ TEST_CASE("a contact problem that is used above what the scene accepts is a warn
   const auto warnings = [](const char* tolerance, const char* acceptance) {
     const std::string text = pyramid(
         fmt::format("max_halvings = 1\ntolerance = {}\nacceptance = {}\n", tolerance, acceptance),
-        "1e4", "0.7");
+        "3e3", "1");
     return run(parse_scene(text, "pyramid.toml")).warnings;
   };
   const auto beyond = warnings("1e-17", "1.5");  // below rounding
