@@ -56,8 +56,8 @@ void measure(const Problem& problem, int batches, int moves) {
     for (int k = 0; k < moves; ++k) {
       perturb();
       const auto begin = std::chrono::steady_clock::now();
-      // From the second on a hundredth of a tolerance off: where there is nothing to move, moves
-      // become looks.
+      // From the second one on points are a hundredth of a tolerance off: where nothing is to be
+      // moved, only g would be evaluated.
       constexpr int kRepeat = 16;
       for (int repeat = 0; repeat < kRepeat; ++repeat) {
         success = mover.move(candidate).status == tp::Status::success && success;

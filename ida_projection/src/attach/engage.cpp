@@ -102,7 +102,7 @@ void Projection::Impl::begin_run(const Candidate& candidate) {
 SetpointFactors Projection::Impl::setpoint_of_high_index(const Candidate& candidate) const {
   const N_Vector id = variables_.id();
   const SetpointFactors usual{kAsideFromTest, kAsideFromTest};
-  if (!in_use(Mechanism::care) || variables_.undetermined().empty()) return usual;
+  if (!in_use(Mechanism::stricter_setpoint) || variables_.undetermined().empty()) return usual;
   const double differential = N_VDotProd(id, id);
   if (constraints_.total_count() > (1.0 - kManyFree) * differential) return usual;
   const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances

@@ -14,43 +14,33 @@ namespace tether::ida_projection {
 /// Each has its row in benchmarks/results/ablation.md: what a run loses without it. Options switch
 /// the others: metric, polish, smoothing, limit of the order, index and suppression.
 enum class Mechanism {
-  repeated_correction,    ///< where a stale Jacobian fooled IDA's convergence test
-  polish_first,           ///< of many rows: before the move
-  foretold_polish,        ///< from earlier ones, without an evaluation of F
+  repeated_correction,    ///< after a stale Jacobian has fooled IDA's test
+  polish_first,           ///< with many rows the polish precedes the move
+  forecast_polish,        ///< the polish is forecast without an evaluation of F
   followers,              ///< IDA's test waits for algebraic variables that follow
-  free_multipliers,       ///< those of index 2 are left out of IDA's convergence test
-  widened_tolerance,      ///< of algebraic variables that respond to moves
-  index_in_trouble,       ///< F is asked for its index where error tests fail
-  care,                   ///< smaller errors in index 2, by tolerance and order
+  free_multipliers,       ///< IDA's convergence test leaves out multipliers of index 2
+  widened_tolerance,      ///< for algebraic variables that respond to moves
+  index_in_trouble,       ///< the index of F is found when error tests fail
+  stricter_setpoint,      ///< smaller errors in index 2, by tolerance and order
   tested_long_moves,      ///< the error test sees the correction before a long move, too
   row_trust,              ///< thin rows count only as far as C can be trusted
-  kept_rank,              ///< which rows are independent is found out now and then
-  looks,                  ///< rows that need no move are only evaluated
+  kept_rank,              ///< independent rows are determined now and then only
+  tests_before_moves,     ///< g alone shows that rows need no move
   rate_limit,             ///< scales of positions are at most h times those of velocities
   other_metric,           ///< one scale for each level, where stiff components respond to moves
-  expected_oscillations,  ///< the order is limited after that
-  joined_equations,       ///< of F, to rows that contain their algebraic variables
+  expected_oscillations,  ///< the order is limited earlier after stiff responses
+  joined_equations,       ///< equations of F move with rows that need them
   false_row_watch,        ///< rows that F does not keep are named
   count
 };
 
-inline constexpr const char* kMechanismNames[] = {"repeated correction",
-                                                  "polish first",
-                                                  "foretold polish",
-                                                  "followers",
-                                                  "free multipliers",
-                                                  "widened tolerance",
-                                                  "index in trouble",
-                                                  "care",
-                                                  "tested long moves",
-                                                  "row trust",
-                                                  "kept rank",
-                                                  "looks",
-                                                  "rate limit",
-                                                  "other metric",
-                                                  "expected oscillations",
-                                                  "joined equations",
-                                                  "false-row watch"};
+inline constexpr const char* kMechanismNames[] = {
+    "repeated correction", "polish first",      "forecast polish",
+    "followers",           "free multipliers",  "widened tolerance",
+    "index in trouble",    "stricter setpoint", "tested long moves",
+    "row trust",           "kept rank",         "tests before moves",
+    "rate limit",          "other metric",      "expected oscillations",
+    "joined equations",    "false-row watch"};
 static_assert(sizeof kMechanismNames / sizeof *kMechanismNames ==
               static_cast<std::size_t>(Mechanism::count));
 

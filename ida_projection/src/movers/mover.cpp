@@ -75,7 +75,8 @@ double Mover::remaining_drift(const Candidate& candidate) {
 // Whether C and the factors of an earlier candidate show that no move is needed. In a run whose
 // constraints IDA keeps by itself g is rounding in every step, and evaluating g alone suffices.
 bool Mover::clearly_needs_no_move() {
-  if (!in_use(Mechanism::looks) || !rows_->may_test_with_factors() || tests_ >= kMostTests)
+  if (!in_use(Mechanism::tests_before_moves) || !rows_->may_test_with_factors() ||
+      tests_ >= kMostTests)
     return false;
   ++tests_;
   ++age_;
@@ -112,7 +113,7 @@ Move Mover::measure(const Candidate& candidate) {
 // The same after moves have begun, once several were not needed: for rows that F contains, or that
 // IDA keeps by itself in most steps.
 bool Mover::needs_no_move_again(const Candidate& candidate, Move& result) {
-  if (!in_use(Mechanism::looks) || nothing_in_row_ < kUnneededMoves) return false;
+  if (!in_use(Mechanism::tests_before_moves) || nothing_in_row_ < kUnneededMoves) return false;
   result.status = rows_->value(candidate.t, false);
   if (result.status != Status::success) return true;
   result.not_needed = still_ = clearly_needs_no_move();

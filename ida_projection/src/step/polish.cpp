@@ -104,7 +104,7 @@ const double* Polish::response(const StepData& step) {
 }
 
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
-  if (in_use(Mechanism::foretold_polish) && forecast_polish(candidate, cj, tolerance))
+  if (in_use(Mechanism::forecast_polish) && forecast_polish(candidate, cj, tolerance))
     return {true, true};
   const bool known = step_known_;
   if (!known) {
