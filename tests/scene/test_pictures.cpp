@@ -9,6 +9,7 @@
 #include <tether/scene/run.hpp>
 #include <vector>
 
+#include "output/thinned.hpp"
 #include "picture/axes.hpp"
 #include "picture/canvas.hpp"
 #include "run_files.hpp"
@@ -267,4 +268,30 @@ TEST_CASE("a picture of a run that ends at its start is one") {
   options.interrupted = [] { return true; };
   run(scene, options);
   texts_of(content(scene.output["svg"]));
+}
+
+TEST_CASE("a thinned run keeps its last record and the errors of all") {
+  struct Record {
+    Diagnostics d;
+    int number = 0;
+    static std::size_t bytes() { return 1; }
+  };
+  for (int records = 1; records <= 40; ++records) {
+    Thinned<Record> thinned(4);
+    for (int k = 1; k <= records; ++k) {
+      Record now;
+      now.number = k;
+      now.d.drift = k == (2 * records + 2) / 3 ? 1 : 0;
+      thinned.add(now);
+    }
+    thinned.finish();
+    INFO(records << " records");
+    const std::vector<Record>& kept = thinned.all();
+    CHECK(kept.size() <= 5);
+    CHECK(kept.front().number == 1);
+    CHECK(kept.back().number == records);
+    double drift = 0;
+    for (const Record& each : kept) drift = std::max(drift, each.d.drift);
+    CHECK(drift == 1);
+  }
 }

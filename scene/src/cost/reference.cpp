@@ -7,13 +7,14 @@
 #include <cmath>
 #include <iterator>
 
+#include "run/judge.hpp"
+
 namespace tether::scene::costs {
 
 namespace {
 
 // Comparisons are for what ends soon: more than these are a storm.
 constexpr int kMostEventSteps = 1000000;
-constexpr double kTimeRounding = 1e-12;  // relative: nearer times are equal
 
 Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q) {
   const double angle = by.norm();

@@ -18,7 +18,7 @@ constexpr binary::Magic kHandedOver = {'h', 'a', 'n', 'd', 'e', 'd', ' ', '3'};
 
 // Steps go on until this many of them have left the same contacts closed. The number doubles if
 // events failed again within a time of that many steps.
-constexpr std::int64_t kUnchangedSteps = 20, kMostUnchangedSteps = std::int64_t{1} << 40;
+constexpr std::int64_t kUnchangedSteps = 20;
 constexpr std::uint64_t kMostHandOvers = 1000;  // then steps go to the end
 
 double energy_of(const Engine& engine) {
@@ -161,7 +161,7 @@ void EventsThenSteps::take_over(const std::string& why) {
   if (events_->time() - since >= required_time)
     required_steps_ = kUnchangedSteps;
   else if (!hand_overs_.empty())
-    required_steps_ = std::min(2 * required_steps_, kMostUnchangedSteps);
+    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
   begin_steps();
   append_hand_over({events_->time(), why, events_->counts(), {}, 0}, energy_of(*events_));
   steps_->begin_at(events_->time(), events_->bodies());
@@ -185,9 +185,9 @@ void EventsThenSteps::give_back_if_settled() {
   try {
     give_back();
   } catch (const SimulationError&) {
-    required_steps_ = std::min(2 * required_steps_, kMostUnchangedSteps);
+    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
   } catch (const std::invalid_argument&) {
-    required_steps_ = std::min(2 * required_steps_, kMostUnchangedSteps);
+    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
   }
 }
 
@@ -224,8 +224,9 @@ void EventsThenSteps::exchange_hand_overs(Self& self, binary::Archive& io) {
   });
   io(self.energy_, self.unchanged_steps_, self.required_steps_);
   io.demand(std::isfinite(self.energy_) && self.unchanged_steps_ >= 0 &&
-            self.unchanged_steps_ <= kMostUnchangedSteps &&
-            self.required_steps_ >= kUnchangedSteps && self.required_steps_ <= kMostUnchangedSteps);
+            self.unchanged_steps_ <= std::int64_t{binary::kMostCounted} &&
+            self.required_steps_ >= kUnchangedSteps &&
+            self.required_steps_ <= std::int64_t{binary::kMostCounted});
   io.list(self.closed_, [&](auto& contact) { io(contact); });
 }
 

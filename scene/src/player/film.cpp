@@ -25,22 +25,12 @@ void add(const Eigen::Vector3d& v, std::vector<float>& out) {
 }  // namespace
 
 Film::Film(std::vector<std::size_t> moving, const View& view, std::size_t bytes)
-    : moving_(std::move(moving)), view_(view), most_bytes_(bytes) {}
-
-void Film::Frame::take_errors(const Frame& other) {
-  drift = std::max(drift, other.drift);
-  penetration = std::max(penetration, other.penetration);
-  residual = std::max(residual, other.residual);
-}
+    : moving_(std::move(moving)), view_(view), frames_(kMostFrames, bytes) {}
 
 Film::Frame Film::frame(const Engine& engine, const Diagnostics& d) const {
   Frame out;
   out.time = engine.time();
-  out.kinetic = d.kinetic_energy;
-  out.potential = d.potential_energy;
-  out.drift = d.drift;
-  out.penetration = d.penetration;
-  out.residual = d.residual;
+  out.d = d;
   const auto in_view = [&](const Eigen::Vector3d& x) -> Eigen::Vector3d {
     return (x - view_.centre) / view_.length;
   };
@@ -61,49 +51,14 @@ Film::Frame Film::frame(const Engine& engine, const Diagnostics& d) const {
   return out;
 }
 
-void Film::record(const Engine& engine, const Diagnostics& d) {
-  Frame now = frame(engine, d);
-  last_kept_ = seen_++ % stride_ == 0;
-  if (!last_kept_) {
-    frames_.back().take_errors(now);
-    last_ = std::move(now);
-    return;
-  }
-  bytes_ += now.bytes();
-  frames_.push_back(std::move(now));
-  if (frames_.size() > kMostFrames || (bytes_ > most_bytes_ && frames_.size() > 2)) halve();
-}
-
-void Film::halve() {
-  std::vector<Frame> half;
-  for (std::size_t i = 0; i < frames_.size(); ++i)
-    if (i % 2 == 0)
-      half.push_back(std::move(frames_[i]));
-    else
-      half.back().take_errors(frames_[i]);
-  if (frames_.size() % 2 == 0) {  // the last record may be the end
-    last_ = std::move(frames_.back());
-    last_kept_ = false;
-  }
-  frames_ = std::move(half);
-  stride_ *= 2;
-  bytes_ = 0;
-  for (const Frame& each : frames_) bytes_ += each.bytes();
-}
-
-void Film::finish() {
-  if (!last_kept_) frames_.push_back(std::move(last_));
-  last_kept_ = true;
-}
-
 void Film::add_to(nlohmann::json& page) const {
-  for (const Frame& each : frames_) {
+  for (const Frame& each : frames_.all()) {
     page["times"].push_back(each.time);
-    page["kinetic"].push_back(each.kinetic);
-    page["potential"].push_back(each.potential);
-    page["drift"].push_back(each.drift);
-    page["penetration"].push_back(each.penetration);
-    page["residual"].push_back(each.residual);
+    page["kinetic"].push_back(each.d.kinetic_energy);
+    page["potential"].push_back(each.d.potential_energy);
+    page["drift"].push_back(each.d.drift);
+    page["penetration"].push_back(each.d.penetration);
+    page["residual"].push_back(each.d.residual);
     page["contacts"].push_back(each.contacts.size() / 9);
   }
 }
@@ -111,7 +66,8 @@ void Film::add_to(nlohmann::json& page) const {
 template <class T>
 std::string Film::joined(std::vector<T> Frame::*part) const {
   std::vector<T> all;
-  for (const Frame& each : frames_) all.insert(all.end(), (each.*part).begin(), (each.*part).end());
+  for (const Frame& each : frames_.all())
+    all.insert(all.end(), (each.*part).begin(), (each.*part).end());
   return base64(all);
 }
 

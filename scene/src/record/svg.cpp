@@ -6,6 +6,7 @@
 #include "bounds.hpp"
 #include "formats.hpp"
 #include "output/files.hpp"
+#include "output/thinned.hpp"
 #include "picture/axes.hpp"
 #include "picture/scene_drawing.hpp"
 
@@ -15,8 +16,8 @@ namespace {
 
 using namespace picture;
 
-constexpr std::size_t kMostRecords = 1024;  // kept; then every second one goes
-constexpr std::size_t kMostPoints = 200;    // of a curve
+constexpr std::size_t kMostRecords = 1024;
+constexpr std::size_t kMostPoints = 200;  // of a curve
 constexpr Box kPicture{0, 0, 860, 440}, kScenePanel{12, 36, 432, 404};
 constexpr Box kEnergyPanel{506, 76, 846, 182}, kErrorPanel{506, 286, 846, 392};
 
@@ -24,6 +25,7 @@ struct Instant {
   double time;
   Diagnostics d;
   Poses bodies;
+  std::size_t bytes() const { return sizeof(bodies[0]) * bodies.size(); }
 };
 
 /// A quantity over time.
@@ -41,23 +43,12 @@ class PictureRecorder : public Recorder {
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {
-    if (seen_++ % stride_ != 0) {
-      last_ = instant(engine, d);
-      last_kept_ = false;
-      return;
-    }
-    instants_.push_back(instant(engine, d));
-    last_kept_ = true;
-    if (instants_.size() < kMostRecords) return;
-    std::vector<Instant> half;
-    for (std::size_t i = 0; i < instants_.size(); i += 2) half.push_back(std::move(instants_[i]));
-    instants_ = std::move(half);
-    stride_ *= 2;
+    instants_.add(instant(engine, d));
   }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
-    if (!last_kept_) instants_.push_back(last_);
-    if (instants_.empty()) return;
+    instants_.finish();
+    if (instants_.all().empty()) return;
     write_whole(file_, svg());
     written.push_back(file_);
   }
@@ -77,8 +68,8 @@ class PictureRecorder : public Recorder {
     canvas.text(fitted(title, 15, kScenePanel.right - kScenePanel.left),
                 {{Vector2d(kScenePanel.left, 22), Anchor::begin}}, kPicture, {15, "#202020"});
     std::vector<const Poses*> motion;
-    for (const Instant& now : instants_) motion.push_back(&now.bodies);
-    draw_scene(canvas, scene_, motion, instants_.back().time, kScenePanel);
+    for (const Instant& now : instants_.all()) motion.push_back(&now.bodies);
+    draw_scene(canvas, scene_, motion, instants_.all().back().time, kScenePanel);
     draw_curves(canvas, kEnergyPanel, 34, energies(), false, "energy / J");
     draw_curves(canvas, kErrorPanel, 240, errors(), true, "");
     return canvas.svg(title);
@@ -94,7 +85,7 @@ class PictureRecorder : public Recorder {
       for (const Vector2d& p : curve.points) values.push_back(p.y());
     }
     draw_legend(canvas, entries, {panel.left, legend, panel.right, panel.top}, 11);
-    Range time{instants_.front().time, instants_.back().time, false};
+    Range time{instants_.all().front().time, instants_.all().back().time, false};
     if (!(time.high > time.low)) time.high = time.low + 1;
     Axes axes(canvas, panel, time, range_of(values, logarithmic));
     axes.draw("t / s", y_title);
@@ -107,13 +98,14 @@ class PictureRecorder : public Recorder {
   template <class Value>
   Curve curve(const char* title, const char* colour, Value value, bool peaks) const {
     Curve out{{title, colour}, {}};
-    const std::size_t step = 1 + instants_.size() / kMostPoints;
-    for (std::size_t i = 0; i < instants_.size(); i += step) {
-      double shown = value(instants_[i].d);
+    const std::vector<Instant>& all = instants_.all();
+    const std::size_t step = 1 + all.size() / kMostPoints;
+    for (std::size_t i = 0; i < all.size(); i += step) {
+      double shown = value(all[i].d);
       if (peaks)
-        for (std::size_t k = i; k < std::min(i + step, instants_.size()); ++k)
-          shown = std::max(shown, value(instants_[k].d));
-      out.points.emplace_back(instants_[i].time, shown);
+        for (std::size_t k = i; k < std::min(i + step, all.size()); ++k)
+          shown = std::max(shown, value(all[k].d));
+      out.points.emplace_back(all[i].time, shown);
     }
     return out;
   }
@@ -158,10 +150,8 @@ class PictureRecorder : public Recorder {
   const Scene& scene_;
   std::string file_;
   double start_energy_;
-  std::size_t bodies_ = 0, stride_ = 1, seen_ = 0;
-  std::vector<Instant> instants_;
-  Instant last_{};
-  bool last_kept_ = true;
+  std::size_t bodies_ = 0;
+  Thinned<Instant> instants_{kMostRecords};
 };
 
 void add_picture(const std::string& svg, const formats::Beginning& run, formats::Recorders& out) {

@@ -16,9 +16,10 @@ struct Event {
   bool end = false;
 };
 
-/// 3 * 0.1 and 0.3 are one time.
+/// Relative: nearer times are one, as 3 * 0.1 and 0.3.
+constexpr double kTimeRounding = 1e-12;
 inline bool same_time(double a, double b) {
-  return std::abs(a - b) <= 1e-12 * std::fmax(std::abs(a), std::abs(b));
+  return std::abs(a - b) <= kTimeRounding * std::fmax(std::abs(a), std::abs(b));
 }
 
 /// In order, after t = 0. Times that are the same but for rounding are one event, with the digits

@@ -115,9 +115,6 @@ std::vector<int> elimination_order(int unknowns, int bodies, int width, int coor
   return order;
 }
 
-#ifdef TETHER_SCENE_KLU
-#endif
-
 NewtonMatrix::NewtonMatrix(System& system, double t, N_Vector y, N_Vector yp, SUNContext context)
     : system_(system) {
   entries_.record();
