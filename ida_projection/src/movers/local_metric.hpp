@@ -15,15 +15,14 @@ class LocalMetric {
   LocalMetric(const Options& options, int size)
       : options_(options),
         scale_(static_cast<std::size_t>(size), 0.0),
-        trial_scale_(static_cast<std::size_t>(size), 0.0) {}
+        trial_scale_(scale_),
+        D_(scale_) {}
 
-  /// Updates s with the present candidate; accept() keeps it. Factors that are reused keep their D.
-  void update_scale(const LoadedCandidate& at);
-  /// The same, and sets D of both blocks of rows: from s or, by the option, WT.
-  template <class Block>
-  void fill(LoadedCandidate& at, Block& d, Block& a);
-  /// D of every component, at the last candidate.
-  void current(const LoadedCandidate& at, double* D) const;
+  /// Updates s with the present candidate, which accept() keeps, and D of every component: from s
+  /// or, by the option, WT.
+  const std::vector<double>& find(const LoadedCandidate& at);
+  /// D as find() left it.
+  const std::vector<double>& D() const { return D_; }
   /// One scale for each of these groups, in place of Options::group.
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
   void forget_levels() { levels_.clear(); }
@@ -36,14 +35,12 @@ class LocalMetric {
 
  private:
   const std::vector<int>& group() const { return levels_.empty() ? options_.group : levels_; }
-  void find_group_scales(LoadedCandidate& at);
-  template <class Block>
-  void use_groups(LoadedCandidate& at, Block& d, Block& a);
-  template <class Block>
-  void limit(const LoadedCandidate& at, Block& block) const;
+  void share(const LoadedCandidate& at);
+  void limit(double h);
 
   const Options& options_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
+  std::vector<double> D_;
   std::vector<int> levels_, levels_of_rates_;
   std::vector<double> group_sum_;
   std::vector<int> group_members_;

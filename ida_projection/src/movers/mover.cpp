@@ -86,7 +86,7 @@ bool Mover::clearly_needs_no_move() {
 Move Mover::measure(const Candidate& candidate) {
   Move result;
   if ((result.status = rows_->load(candidate, true)) != Status::success) return result;
-  const bool may_do = rows_->has_factors() && tests_ < kMostTests;  // with g alone
+  const bool may_do = rows_->may_test_with_factors() && tests_ < kMostTests;  // with g alone
   result.status = rows_->value(candidate.t, !may_do);
   if (result.status != Status::success) return result;
   result.drift_before = result.drift_after = rows_->drift();

@@ -81,9 +81,8 @@ class RowsAt {
   /// Largest |g_i| as evaluated last.
   virtual double drift() const = 0;
 
-  virtual bool has_factors() const = 0;
-  /// Whether current factors may be used to see that no move is needed.
-  virtual bool may_test_with_factors() const { return has_factors(); }
+  /// Whether there are factors, and they may be used to see that no move is needed.
+  virtual bool may_test_with_factors() const = 0;
   /// Whether the independent rows were determined for this candidate.
   virtual bool decided() const { return true; }
   virtual void forget_rank() {}

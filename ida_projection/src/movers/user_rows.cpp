@@ -56,7 +56,7 @@ class UserRows final : public RowsAt {
   double shift(N_Vector change) override { return N_VWrmsNorm(change, at_.weights); }
   void restart(const Candidate&) override {}
   double drift() const override { return 0.0; }
-  bool has_factors() const override { return false; }
+  bool may_test_with_factors() const override { return false; }
   bool contradicts() override { return false; }
   Status set_algebraic(const Candidate&, N_Vector) override { return Status::success; }
   void reset() override {}

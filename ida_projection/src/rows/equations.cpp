@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tether/linalg/least_squares.hpp>
 
 #include "rows/split_rows.hpp"
@@ -20,57 +21,94 @@ constexpr double kRestricts = 1e-2;  // of a row: the candidate is off the set b
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
-// Central differences of the chosen equations of F. False: F failed.
-bool slopes(const Residual& residual, const std::vector<int>& equations,
-            const std::vector<double>& y, const std::vector<double>& WT, Dense* h) {
-  const std::size_t n = y.size();
-  std::vector<double> point = y, plus(n), minus(n);
-  double largest = 0.0;
-  for (double value : y) largest = std::max(largest, std::abs(value));
-  h->setZero(static_cast<Eigen::Index>(equations.size()), static_cast<Eigen::Index>(n));
-  for (std::size_t j = 0; j < n; ++j) {
-    double change = std::max(1e-5 * std::abs(y[j]), std::min(WT[j], 1e-5 * largest));
-    if (!(change > 0.0)) change = 1e-8;
-    point[j] = y[j] + change;
-    const double high = point[j];
-    if (!residual(point.data(), plus.data())) return false;
-    point[j] = y[j] - change;
-    if (!residual(point.data(), minus.data())) return false;
-    for (std::size_t i = 0; i < equations.size(); ++i) {
-      const std::size_t e = at(equations[i]);
-      (*h)(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          (plus[e] - minus[e]) / (high - point[j]);
-    }
-    point[j] = y[j];
+/// The equations and their differences; columns in groups that share no equation.
+class Differences {
+ public:
+  Differences(const JoinedEquations& found, Residual residual,
+              std::function<const double*()> weights, int size)
+      : equations_(found.equations),
+        columns_(found.columns),
+        residual_(std::move(residual)),
+        weights_(std::move(weights)),
+        group_of_(at(size), -1),
+        point_(at(size)),
+        base_(at(size)),
+        shifted_(at(size)),
+        change_(at(size)),
+        size_(at(size)) {
+    for (int j = 0; j < size; ++j) assign_group(j);
   }
-  return h->allFinite();
-}
 
-// On which unknowns the equations depend, by large changes near a point at which nothing is zero.
-std::vector<std::vector<int>> patterns(const Residual& residual, const std::vector<int>& equations,
-                                       std::vector<double> point) {
-  const std::size_t n = point.size();
-  double largest = 0.0;
-  for (double value : point) largest = std::max(largest, std::abs(value));
-  std::vector<std::vector<int>> columns(equations.size());
-  std::vector<double> base(n), changed(n);
-  const bool known = residual(point.data(), base.data());
-  for (std::size_t j = 0; j < n; ++j) {
-    const double value = point[j];
-    bool same = known;
-    std::vector<char> notices(equations.size(), 0);
-    for (const double change : {1e-2, -3e-2}) {
-      point[j] = value + change * (largest > 0.0 ? largest : 1.0);
-      same = same && residual(point.data(), changed.data());
-      for (std::size_t i = 0; i < equations.size(); ++i)
-        if (!same || changed[at(equations[i])] != base[at(equations[i])]) notices[i] = 1;
-    }
-    point[j] = value;
-    for (std::size_t i = 0; i < equations.size(); ++i)
-      if (notices[i]) columns[i].push_back(static_cast<int>(j));
+  int value(const double* y, double* g) {
+    if (!residual_(y, base_.data())) return 1;
+    for (std::size_t i = 0; i < equations_.size(); ++i) g[i] = base_[at(equations_[i])];
+    return 0;
   }
-  return columns;
-}
+
+  // Central differences: rows that nearly depend on each other magnify what one-sided ones leave.
+  int entries(const double* y, double* values) {
+    constexpr double kIncrement = 1e-5;  // of the largest |y_j| so far
+    std::copy(y, y + point_.size(), point_.begin());
+    double largest = 0.0;
+    for (double value : point_) largest = std::max(largest, std::abs(value));
+    const double* w = weights_();
+    for (int group = 0; group < groups_; ++group) {
+      for (std::size_t j = 0; j < point_.size(); ++j) {
+        if (group_of_[j] != group) continue;
+        const double tolerance = w != nullptr && w[j] > 0.0 ? 1.0 / w[j] : largest;
+        size_[j] = std::max(size_[j], std::abs(y[j]));
+        change_[j] = std::max(kIncrement * size_[j], std::min(tolerance, kIncrement * largest));
+        if (!(change_[j] > 0.0)) change_[j] = kIncrement;
+        point_[j] = y[j] - change_[j];
+      }
+      if (!residual_(point_.data(), base_.data())) return 1;
+      for (std::size_t j = 0; j < point_.size(); ++j) {
+        if (group_of_[j] != group) continue;
+        const double low = point_[j];
+        point_[j] = y[j] + change_[j];
+        change_[j] = point_[j] - low;
+      }
+      if (!residual_(point_.data(), shifted_.data())) return 1;
+      double* entry = values;
+      for (std::size_t i = 0; i < equations_.size(); ++i) {
+        const std::size_t e = at(equations_[i]);
+        for (int j : columns_[i]) {
+          if (group_of_[at(j)] == group) *entry = (shifted_[e] - base_[e]) / change_[at(j)];
+          ++entry;
+        }
+      }
+      for (std::size_t j = 0; j < point_.size(); ++j)
+        if (group_of_[j] == group) point_[j] = y[j];
+    }
+    return 0;
+  }
+
+ private:
+  // The first group with no column that meets column j in an equation.
+  void assign_group(int j) {
+    std::vector<char> taken(at(groups_) + 1, 0);
+    bool used = false;
+    for (const std::vector<int>& columns : columns_) {
+      if (!std::binary_search(columns.begin(), columns.end(), j)) continue;
+      used = true;
+      for (int other : columns)
+        if (group_of_[at(other)] >= 0) taken[at(group_of_[at(other)])] = 1;
+    }
+    if (!used) return;
+    const auto free = std::find(taken.begin(), taken.end(), 0);
+    group_of_[at(j)] = static_cast<int>(free - taken.begin());
+    groups_ = std::max(groups_, group_of_[at(j)] + 1);
+  }
+
+  std::vector<int> equations_;
+  std::vector<std::vector<int>> columns_;
+  Residual residual_;
+  std::function<const double*()> weights_;
+  std::vector<int> group_of_;  // of each column; -1: in no equation
+  int groups_ = 0;
+  std::vector<double> point_, base_, shifted_, change_;
+  std::vector<double> size_;  // largest |y_j| so far
+};
 
 // A point at which no unknown is zero by chance.
 std::vector<double> further_away(const std::vector<double>& y, const std::vector<double>& WT) {
@@ -130,15 +168,22 @@ struct Point {
                 double t, const std::vector<double>& y, const std::vector<double>& WT,
                 const std::vector<int>& free, const std::vector<int>& algebraic) {
     const auto n = static_cast<int>(y.size());
-    Dense given = Dense::Zero(rows.rows(), n), all;
-    if (rows.jacobian(t, y.data(), n, WT.data(), free, given.data()) != Status::success)
+    C = Dense::Zero(rows.rows(), n);
+    h = Dense::Zero(static_cast<Eigen::Index>(equations.size()), n);
+    std::vector<int> held(y.size());
+    std::iota(held.begin(), held.end(), 0);
+    std::vector<double> weights(WT);
+    for (double& w : weights) w = w > 0.0 ? 1.0 / w : 0.0;
+    Differences of_F(
+        {equations, {equations.size(), held}, {}}, residual, [&] { return weights.data(); }, n);
+    if (rows.jacobian(t, y.data(), n, WT.data(), free, C.data()) != Status::success ||
+        of_F.entries(y.data(), h.data()) != 0 || !C.allFinite() || !h.allFinite())
       return false;
-    if (!given.allFinite() || !slopes(residual, equations, y, WT, &all)) return false;
-    C = Dense::Zero(given.rows(), n);
-    h = Dense::Zero(all.rows(), n);
-    for (int j : free) {
-      C.col(j) = given.col(j);
-      h.col(j) = all.col(j);
+    for (int j : free) held[at(j)] = -1;
+    for (int j : held) {
+      if (j < 0) continue;
+      C.col(j).setZero();
+      h.col(j).setZero();
     }
     scale(WT, &C);
     scale(WT, &h);
@@ -238,6 +283,22 @@ bool are_the_equations(Evaluator& rows, const Residual& residual, const std::vec
   });
 }
 
+// The unknowns that the equations notice, by large changes near a point where nothing is zero.
+static void find_columns(const Residual& residual, double t, const std::vector<double>& point,
+                         JoinedEquations* found) {
+  const auto n = static_cast<int>(point.size());
+  found->columns.assign(found->equations.size(), {});
+  Constraints set = as_constraints(*found, residual, {}, n);
+  set.jacobian = FiniteDifferences();
+  Statistics uncounted;
+  Evaluator equations(set, uncounted);
+  const std::vector<double> any_scale(point.size(), 0.0);
+  equations.sensitive(t, point.data(), n, any_scale.data(), [found](int i, int j) {
+    std::vector<int>& columns = found->columns[at(i)];
+    if (columns.empty() || columns.back() != j) columns.push_back(j);
+  });
+}
+
 JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
                                       const std::vector<char>& derivative_free, double t,
                                       const std::vector<double>& y, const std::vector<double>& WT,
@@ -318,102 +379,9 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
     if (!used[e] || !together.add(here.h.row(k).transpose(), kExplained)) continue;
     found.equations.push_back(equations[e]);
   }
-  found.columns = patterns(residual, found.equations, further_away(y, WT));
+  find_columns(residual, t, further_away(y, WT), &found);
   return found;
 }
-
-namespace {
-
-/// The equations and their differences; columns in groups that share no equation.
-class Differences {
- public:
-  Differences(const JoinedEquations& found, Residual residual,
-              std::function<const double*()> weights, int size)
-      : equations_(found.equations),
-        columns_(found.columns),
-        residual_(std::move(residual)),
-        weights_(std::move(weights)),
-        group_of_(at(size), -1),
-        point_(at(size)),
-        base_(at(size)),
-        shifted_(at(size)),
-        change_(at(size)),
-        size_(at(size)) {
-    for (int j = 0; j < size; ++j) assign_group(j);
-  }
-
-  int value(const double* y, double* g) {
-    if (!residual_(y, base_.data())) return 1;
-    for (std::size_t i = 0; i < equations_.size(); ++i) g[i] = base_[at(equations_[i])];
-    return 0;
-  }
-
-  // Central differences: rows that nearly depend on each other magnify what one-sided ones leave.
-  int entries(const double* y, double* values) {
-    constexpr double kIncrement = 1e-5;  // of the largest |y_j| so far
-    std::copy(y, y + point_.size(), point_.begin());
-    double largest = 0.0;
-    for (double value : point_) largest = std::max(largest, std::abs(value));
-    const double* w = weights_();
-    for (int group = 0; group < groups_; ++group) {
-      for (std::size_t j = 0; j < point_.size(); ++j) {
-        if (group_of_[j] != group) continue;
-        const double tolerance = w != nullptr && w[j] > 0.0 ? 1.0 / w[j] : largest;
-        size_[j] = std::max(size_[j], std::abs(y[j]));
-        change_[j] = std::max(kIncrement * size_[j], std::min(tolerance, kIncrement * largest));
-        if (!(change_[j] > 0.0)) change_[j] = kIncrement;
-        point_[j] = y[j] - change_[j];
-      }
-      if (!residual_(point_.data(), base_.data())) return 1;
-      for (std::size_t j = 0; j < point_.size(); ++j) {
-        if (group_of_[j] != group) continue;
-        const double low = point_[j];
-        point_[j] = y[j] + change_[j];
-        change_[j] = point_[j] - low;
-      }
-      if (!residual_(point_.data(), shifted_.data())) return 1;
-      double* entry = values;
-      for (std::size_t i = 0; i < equations_.size(); ++i) {
-        const std::size_t e = at(equations_[i]);
-        for (int j : columns_[i]) {
-          if (group_of_[at(j)] == group) *entry = (shifted_[e] - base_[e]) / change_[at(j)];
-          ++entry;
-        }
-      }
-      for (std::size_t j = 0; j < point_.size(); ++j)
-        if (group_of_[j] == group) point_[j] = y[j];
-    }
-    return 0;
-  }
-
- private:
-  // The first group with no column that meets column j in an equation.
-  void assign_group(int j) {
-    std::vector<char> taken(at(groups_) + 1, 0);
-    bool used = false;
-    for (const std::vector<int>& columns : columns_) {
-      if (!std::binary_search(columns.begin(), columns.end(), j)) continue;
-      used = true;
-      for (int other : columns)
-        if (group_of_[at(other)] >= 0) taken[at(group_of_[at(other)])] = 1;
-    }
-    if (!used) return;
-    const auto free = std::find(taken.begin(), taken.end(), 0);
-    group_of_[at(j)] = static_cast<int>(free - taken.begin());
-    groups_ = std::max(groups_, group_of_[at(j)] + 1);
-  }
-
-  std::vector<int> equations_;
-  std::vector<std::vector<int>> columns_;
-  Residual residual_;
-  std::function<const double*()> weights_;
-  std::vector<int> group_of_;  // of each column; -1: in no equation
-  int groups_ = 0;
-  std::vector<double> point_, base_, shifted_, change_;
-  std::vector<double> size_;  // largest |y_j| so far
-};
-
-}  // namespace
 
 Constraints as_constraints(const JoinedEquations& found, Residual residual,
                            std::function<const double*()> weights, int size) {

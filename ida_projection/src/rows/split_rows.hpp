@@ -48,15 +48,11 @@ template <class Solver>
 class SplitRows {
  public:
   using Block = BlockOf<Solver>;
+  /// Pivots of dense rows tell which are independent and which need RowTrust. Rows that are known
+  /// to be independent have factors that cost half or less.
   static constexpr bool kDense = std::is_same_v<Solver, linalg::MinimumNorm>;
-  static constexpr bool kSparse = !kDense;
-  /// Dense rows that are known to be independent are factored by their Gram matrix, which costs
-  /// less than an orthogonal factorisation.
-  static constexpr bool kKeepsRank = kDense;
   /// With many rows a second Newton step is cheap beside the factors.
   static bool many(int rows) { return kDense && rows > kMany; }
-  /// Dense pivots tell which rows need RowTrust.
-  static constexpr bool kThinRows = kDense;
 
   SplitRows(const Constraints& constraints, const Evaluator& evaluator, int n);
 
@@ -83,6 +79,12 @@ class SplitRows {
   void rearrange();
   /// A move failed: perhaps entries of C are missing that g could not fill before.
   void refresh_pattern_soon() { refresh_.soon(); }
+  /// D of all unknowns, for the next factor().
+  void set_metric(const double* D) {
+    for (Block* block : {&d, &a})
+      if (!block->rows.empty())
+        block->for_columns([D, to = block->D()](int k, int j) { to[k] = D[j]; });
+  }
   /// From C and the metric in d.D() and a.D(). False: an entry is not finite.
   bool factor();
   /// The same with the rows that the last factor() has kept. False: factor() is due.

@@ -51,12 +51,7 @@ class ContiguousTangent final : public TangentRows {
   }
 
   Status factor(N_Vector D) override {
-    const double* metric = N_VGetArrayPointer(D);
-    for (auto* block : {&blocks_.d, &blocks_.a}) {
-      if (block->rows.empty()) continue;
-      double* to = block->D();
-      block->for_columns([=](int k, int j) { to[k] = metric[j]; });
-    }
+    blocks_.set_metric(N_VGetArrayPointer(D));
     return factor_rows();
   }
 
@@ -126,7 +121,7 @@ class ContiguousTangent final : public TangentRows {
   }
 
   Status factor_rows() {
-    known_ = known_ && Rows::kKeepsRank && !(blocks_.dropped_rows() && ++age_ % kDecideEvery == 0);
+    known_ = known_ && Rows::kDense && !(blocks_.dropped_rows() && ++age_ % kDecideEvery == 0);
     if (known_ && blocks_.factor_kept()) {
       ++statistics_.refactorizations;
       return Status::success;
@@ -136,7 +131,7 @@ class ContiguousTangent final : public TangentRows {
       message_ = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t_);
       return Status::not_finite;
     }
-    if constexpr (Rows::kThinRows)
+    if constexpr (Rows::kDense)
       for (auto* block : {&blocks_.d, &blocks_.a})
         if (!block->rows.empty()) block->solver.use_rank(RowTrust::firm_rows(block->solver));
     known_ = true;

@@ -133,7 +133,7 @@ bool PointProjection::found(ConsistencyReport& report) {
     report.message = rows_->message;
   } else if (!ended) {
     report.message = rows_->message;
-  } else if (rows_->has_factors() && rows_->contradicts()) {
+  } else if (rows_->contradicts()) {
     report.status = Status::inconsistent;
     report.message = rows_->message;
     report.contradicting_rows = rows_->contradicting;

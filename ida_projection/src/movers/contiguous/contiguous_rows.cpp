@@ -22,7 +22,7 @@ constexpr double kAlike = 0.05;  // relative change of a sum of squares
 template <class Rows>
 Status ContiguousRows<Rows>::load(const Candidate& candidate, bool refills) {
   at_.load(candidate);
-  if (!refills) metric_.update_scale(at_);
+  if (!refills) metric_.find(at_);
   uses_.decided = moved_ = false;
   return blocks_.structured() ? Status::success : structure(candidate, nullptr);
 }
@@ -132,8 +132,7 @@ Status ContiguousRows<Rows>::factor(double t, bool refill) {
   rows_known_ = false;
   t_ = t;
   factored_ = std::min(factored_ + 1, kEarly + 1);
-  const bool known =
-      in_use(Mechanism::kept_rank) && Rows::kKeepsRank && uses_.lasting && uses_.there;
+  const bool known = in_use(Mechanism::kept_rank) && Rows::kDense && uses_.lasting && uses_.there;
   uses_.there = false;
   if (known && blocks_.factor_kept()) {
     uses_.thin = false;
@@ -153,7 +152,7 @@ bool ContiguousRows<Rows>::decide() {
   if (count() > kMany) find_rates();
   if (!blocks_.factor()) return false;
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
-  if constexpr (Rows::kThinRows)
+  if constexpr (Rows::kDense)
     uses_.thin = in_use(Mechanism::row_trust) && RowTrust::has_thin_rows(blocks_.counted().solver);
   uses_.lasting = !uses_.thin;
   uses_.decided = true;
@@ -215,7 +214,7 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
   }
   // A polish of few rows is too short to show it.
   const bool shows = how != Solve::rest || traits.measures_rest;
-  if (Rows::kKeepsRank && shows && !dropped_follow()) {
+  if (Rows::kDense && shows && !dropped_follow()) {
     uses_.lasting = false;
     if ((found.status = factor(t_, false)) != Status::success) return found;
     blocks_.solve(g_);
@@ -231,7 +230,7 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
 // factorisation. Returns the length of the solution with those.
 template <class Rows>
 double ContiguousRows<Rows>::judge_thin_rows(double length) {
-  if constexpr (Rows::kThinRows) {
+  if constexpr (Rows::kDense) {
     linalg::MinimumNorm& solver = blocks_.counted().solver;
     const int all = solver.rank();
     if (blocks_.trust.trusted_rows(solver, length) == all) return length;
@@ -338,7 +337,7 @@ template <class Rows>
 void ContiguousRows<Rows>::reset() {
   uses_.there = false;
   metric_.reset();
-  if constexpr (Rows::kThinRows) blocks_.trust.reset();
+  if constexpr (Rows::kDense) blocks_.trust.reset();
   usual_ = 0.0;
   factored_ = rate_searches_ = 0;
   levels_known_ = false;

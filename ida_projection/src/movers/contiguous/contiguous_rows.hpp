@@ -27,7 +27,7 @@ class ContiguousRows final : public RowsAt {
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, int reported)
       : RowsAt({true, Rows::many(constraints.total_count()),
-                constraints.total_count() > kMany || Rows::kSparse}),
+                constraints.total_count() > kMany || !Rows::kDense}),
         evaluator_(constraints, statistics),
         blocks_(constraints, evaluator_, size),
         at_(size),
@@ -53,14 +53,13 @@ class ContiguousRows final : public RowsAt {
   double shift(N_Vector change) override;
   void restart(const Candidate&) override { at_.restart(); }
   double drift() const override;
-  bool has_factors() const override { return uses_.there; }
   bool may_test_with_factors() const override {
     return uses_.there && !uses_.thin && !blocks_.dropped_rows();
   }
   bool decided() const override { return uses_.decided; }
   void forget_rank() override { uses_.lasting = false; }
   bool may_polish_first() const override {
-    return Rows::kSparse ? !blocks_.dropped_rows() : traits.measures_rest;
+    return Rows::kDense ? traits.measures_rest : !blocks_.dropped_rows();
   }
   bool contradicts() override;
   void refresh_pattern_soon() override { blocks_.refresh_pattern_soon(); }
@@ -70,9 +69,8 @@ class ContiguousRows final : public RowsAt {
     return structure(candidate, id != nullptr ? N_VGetArrayPointer(id) : nullptr);
   }
   bool metric(N_Vector D) const override {
-    if (at_.w == nullptr) return false;
-    metric_.current(at_, N_VGetArrayPointer(D));
-    return true;
+    std::copy(metric_.D().begin(), metric_.D().end(), N_VGetArrayPointer(D));
+    return uses_.there;
   }
   void accept() override { metric_.accept(); }
   void reset() override;
@@ -101,7 +99,7 @@ class ContiguousRows final : public RowsAt {
   int count() const { return static_cast<int>(g_.size()); }
   int unknowns() const { return static_cast<int>(at_.y.size()); }
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
-  void fill_metric() { metric_.fill(at_, blocks_.d, blocks_.a); }
+  void fill_metric() { blocks_.set_metric(metric_.find(at_).data()); }
   Block& counted() { return blocks_.d.rows.empty() ? blocks_.a : blocks_.d; }
   Status with_message(Status status) {
     if (status != Status::success) message = evaluator_.message();

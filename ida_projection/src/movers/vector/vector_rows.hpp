@@ -84,7 +84,6 @@ class VectorRows final : public RowsAt {
     N_VLinearSum(1.0, candidate.base, 1.0, candidate.correction, y_);
   }
   double drift() const override { return rows_.drift(); }
-  bool has_factors() const override { return factored_; }
   bool may_test_with_factors() const override { return factored_ && rows_.whole(); }
   bool contradicts() override {
     if (!rows_.contradict(dy_)) return false;
