@@ -38,7 +38,8 @@ int main() {
   tether::ida_projection::fast_vector(yy, yp);
   void* ida_mem = IDACreate(ctx);
   if (check(IDAInit(ida_mem, pendulum, 0.0, yy, yp), "IDAInit")) return 1;
-  tether::ida_projection::Projection projection(ida_mem, constraints());
+  const tether::ida_projection::Constraints c = constraints();
+  tether::ida_projection::Projection projection(ida_mem, c);
   if (check(IDASStolerances(ida_mem, 1e-6, 1e-6), "IDASStolerances")) return 1;
   SUNMatrix A = SUNDenseMatrix(NEQ, NEQ, ctx);
   SUNLinearSolver LS = SUNLinSol_Dense(yy, A, ctx);
