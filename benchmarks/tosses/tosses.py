@@ -64,9 +64,12 @@ def frames(file):
         _, offset, (_, rows, columns), stride, *_ = Unpickler(stream).load()
         Unpickler(stream).load()  # keys of the storages: one
         count, = struct.unpack('<q', stream.read(8))
-        numbers = numpy.frombuffer(stream.read(8 * count))
-    if offset or stride[1:] != (columns, 1) or columns < 7:
-        raise ValueError(f'{file}: must hold one tensor of rows of at least 7 numbers')
+        data = stream.read(8 * count)
+    if offset or stride[1:] != (columns, 1) or columns < 7 or len(data) != 8 * count or count < rows * columns:
+        raise ValueError('must hold one tensor of rows of at least 7 numbers, in doubles')
+    numbers = numpy.frombuffer(data)
+    if not numpy.isfinite(numbers).all():
+        raise ValueError('a number is not finite')
     return numbers[:rows * columns].reshape(rows, columns)
 
 
@@ -202,9 +205,17 @@ def main():
     parser.add_argument('--tested', type=int, default=None)
     parser.add_argument('--jobs', type=int, default=os.cpu_count())
     arguments = parser.parse_args()
-    cube = json.loads((arguments.data / 'params_processed' / 'experiment.json').read_text())
-    files = sorted((arguments.data / 'tosses_processed').glob('*.pt'), key=lambda file: int(file.stem))
-    tosses = [toss for toss in (Toss(file, cube['dt']) for file in files) if toss.is_usable()]
+    file = arguments.data / 'params_processed' / 'experiment.json'
+    try:
+        cube = json.loads(file.read_text())
+        cube = {key: float(cube[key]) for key in ('dt', 'mass', 'inertia')}
+        files = sorted((arguments.data / 'tosses_processed').glob('*.pt'), key=lambda file: int(file.stem))
+        tosses = []
+        for file in files:
+            tosses.append(Toss(file, cube['dt']))
+    except (OSError, EOFError, KeyError, TypeError, ValueError, struct.error, pickle.UnpicklingError) as error:
+        return f'tosses.py: {file}: {type(error).__name__}: {error}'
+    tosses = [toss for toss in tosses if toss.is_usable()]
     fitted, tested = tosses[:arguments.fitted], tosses[arguments.fitted:][:arguments.tested]
     if len(tested) < 2:
         return f'tosses.py: {len(tosses)} throws begin in free flight; two more than {arguments.fitted} are needed'
