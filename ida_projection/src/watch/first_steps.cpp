@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kOffItsSet = 2.0;  // tolerances: F has moved a row so far off its set
 constexpr int kRefinements = 3;
-constexpr double kSettles = 0.1;    // changes of the rate in the last of them
+constexpr double kSettles = 0.01;   // change of the rate in the last of them, see look_into()
+constexpr double kAgree = 0.5;      // difference of two rates in a row
 constexpr double kRounding = 1e-9;  // of the terms: differences of g know no less
 constexpr double kConfirmed = 0.5;  // of it, by a better y'
 constexpr int kSeen = 3;            // times, before a vanished row or a small solution is said
@@ -95,7 +96,7 @@ std::string FirstSteps::find_false_rows(const Attempt& at, Mover& mover) {
     row.sum += tangency_.rate[i] * at.h;
     row.span += at.h;
     const double noticed = kOffItsSet * root * tangency_.tolerance[i];
-    if (!(std::abs(row.sum) > row.limit * noticed)) continue;
+    if (!(std::abs(row.sum) > row.limit * noticed) && row.suspected == 0.0) continue;
     text = look_into(static_cast<int>(i), noticed, at);
     row.sum = row.span = 0.0;
     row.limit *= 2.0;  // what was noise is so again
@@ -160,10 +161,14 @@ std::string FirstSteps::look_into(int row, double noticed, const Attempt& at) {
   faults_.pass_end_to(at.corrector);
   if (!known) return {};
   const double terms = tangency_.terms[i] + std::abs(in_time);
-  double& verified = run_.rows[i].verified;
-  if (std::abs(along) > rounding && std::abs(along - before) <= kSettles * std::abs(along))
-    verified += along * run_.rows[i].span;
-  if (std::abs(verified) > kConfirmed * noticed) {
+  Row& of = run_.rows[i];
+  const bool settled =
+      std::abs(along) > rounding && std::abs(along - before) <= kSettles * std::abs(along);
+  if (settled) of.verified += along * of.span;
+  const double earlier = std::exchange(of.suspected, 0.0);
+  if (settled && std::abs(of.verified) > kConfirmed * noticed) of.suspected = along;
+  // At a singular position F determines no y', whatever the sum: the next look decides.
+  if (std::abs(earlier - of.suspected) < kAgree * std::abs(of.suspected)) {
     const std::string kink = may_search() ? faults_.kink(row, t, point_) : std::string();
     if (!kink.empty()) return kink;
     run_.false_row_found = true;

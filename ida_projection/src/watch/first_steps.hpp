@@ -53,6 +53,7 @@ class FirstSteps {
   struct Row {
     double sum = 0.0, span = 0.0;  // of C y' over time, and the time
     double verified = 0.0;         // what a better y' left of the sums so far
+    double suspected = 0.0;        // rate that verified them at the last look; 0: none did
     double limit = 1.0;            // of the sum from which on it is verified
     int vanished = 0;              // steps in which its gradient was zero
   };
