@@ -5,8 +5,9 @@
 namespace tether::scene {
 
 const char* name(ContactEvent::Kind kind) {
-  constexpr std::array words = {"impact", "touch",  "lift",      "slip",   "stop", "rest",
-                                "jam",    "border", "hand_over", "resume", "roll", "roll_stop"};
+  constexpr std::array words = {"impact", "touch",     "lift",   "slip",      "stop",
+                                "rest",   "jam",       "border", "hand_over", "resume",
+                                "roll",   "roll_stop", "attach", "detach",    "break"};
   const auto k = static_cast<std::size_t>(kind);
   return k < words.size() ? words[k] : "?";
 }

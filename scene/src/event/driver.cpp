@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "mechanics/roots.hpp"
 #include "output/binary.hpp"
 #include "sundials/ida_session.hpp"
 
@@ -170,17 +171,21 @@ std::vector<int> Driver::with_moments(std::vector<int> contacts) const {
   return contacts;
 }
 
-void Driver::advance(double t, const std::function<bool()>& interrupted) {
+void Driver::advance(double t, const std::function<bool()>& interrupted,
+                     const std::function<double()>& excess) {
   while (time_ < t) {
-    const double end = next_ ? next_->time : phase_->step_end();
+    const bool above = std::isfinite(above_from_);
+    const double end = above ? above_from_ : next_ ? next_->time : phase_->step_end();
     // An event of a phase that was taken again may lie before a time that was told already.
-    const double reached = next_ ? std::max(time_, phase_->start() + end) : phase_->start() + end;
-    if (reached > time_ || (next_ && reached >= time_)) {
+    const double reached =
+        next_ || above ? std::max(time_, phase_->start() + end) : phase_->start() + end;
+    if (reached > time_ || ((next_ || above) && reached >= time_)) {
       if (reached > t) {
         time_ = t;
         return;
       }
       time_ = reached;
+      if (above) return;
       if (next_) {
         const Zero zero = *next_;
         handle(zero);
@@ -198,10 +203,23 @@ void Driver::advance(double t, const std::function<bool()>& interrupted) {
     check_pace(t);
     next_ = watcher_.first_zero(*phase_);
     if (repeat_phase()) continue;
-    if (next_) continue;
-    turn_slips();
-    rows_are_weak_ = phase_->has_weak_rows();
+    if (!next_) {
+      turn_slips();
+      rows_are_weak_ = phase_->has_weak_rows();
+    }
+    if (excess) find_excess(excess);
   }
+}
+
+void Driver::find_excess(const std::function<double()>& excess) {
+  VectorXd y, rate(motion_.size());
+  const auto at = [&](double time) {
+    phase_->at(time, y);
+    motion_.rate(phase_->start() + time, y.data(), rate.data());
+    return excess();
+  };
+  above_from_ =
+      mechanics::first_above(at, phase_->step_begin(), next_ ? next_->time : phase_->step_end());
 }
 
 // Repeats the phase from its start where a gap is zero with hardly any speed, at the tolerance that
@@ -494,6 +512,7 @@ void Driver::start_phase(double most) {
                                    kink_ - event_time_);
   watcher_.begin(event_time_, y_, leaving);
   next_.reset();
+  above_from_ = kInfinity;
 }
 
 // The least acceleration of a slip that begins at rest. What is left of a swing with friction may

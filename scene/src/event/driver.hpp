@@ -67,8 +67,10 @@ class Driver {
   Driver(Model& model, const DriverOptions& options, const Memory& memory);
   Memory memory() const;  ///< of the start of the present phase
 
-  /// To time t; early where `interrupted`. Throws SimulationError.
-  void advance(double t, const std::function<bool()>& interrupted = {});
+  /// To time t; early where `interrupted`, and where `excess` is above 0 first, a function of the
+  /// state that the motion has the accelerations and forces of. Throws SimulationError.
+  void advance(double t, const std::function<bool()>& interrupted = {},
+               const std::function<double()>& excess = {});
   /// From the start of the present phase to a time in it; false: it is not in it, or too far.
   bool arrive(double t);
   double time() const { return time_; }
@@ -90,6 +92,7 @@ class Driver {
   void settle_velocities();
   void start_phase(double most = 1);  // tolerance of IDA
   bool repeat_phase();
+  void find_excess(const std::function<double()>& excess);
   void handle(const Zero& zero);
   void anchor();
   void check_pace(double t) const;
@@ -147,6 +150,7 @@ class Driver {
   std::unique_ptr<Phase> phase_;
   bool rows_are_weak_ = false;  // of joints, those in use
   std::optional<Zero> next_;
+  double above_from_ = kInfinity;  // since the start of the phase
   std::vector<Bounces> bounces_;
   std::vector<EventRecord> events_;
   Counts counts_;

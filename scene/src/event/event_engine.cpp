@@ -49,7 +49,8 @@ class EventEngine : public ResumableEngine {
     }
     now_.setZero(model_->coordinates() + model_->velocities() + 1);
     if (begin == Begin::later) return;
-    driver_ = std::make_unique<Driver>(*model_, options_, 0.0, model_->start());
+    driver_ = std::make_unique<Driver>(*model_, options_, scene_.start ? scene_.start->time : 0.0,
+                                       model_->start());
     update_results();
   }
 
@@ -57,8 +58,11 @@ class EventEngine : public ResumableEngine {
   double time() const override { return units_.time * driver_->time(); }
 
   void advance(double t) override {
+    std::function<double()> above;
+    if (excess()) above = [this] { return excess()(forces_of_motion()); };
     try {
-      driver_->advance(t / units_.time, [this] { return interrupted(); });
+      driver_->advance(
+          t / units_.time, [this] { return interrupted(); }, above);
     } catch (const SimulationError&) {
       update_results();
       throw;
@@ -72,7 +76,10 @@ class EventEngine : public ResumableEngine {
     if (!contacts_known_) find_contact_states();
     return contacts_;
   }
-  Forces forces() const override;
+  Forces forces() const override {
+    driver_->state_with_forces();
+    return forces_of_motion();
+  }
   const std::vector<ContactEvent>& events() const override { return events_; }
 
   Counts counts() const override { return driver_->counts(); }
@@ -90,6 +97,7 @@ class EventEngine : public ResumableEngine {
  private:
   VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
   StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
+  Forces forces_of_motion() const;
   void update_results();
   void find_contact_states() const;
   void append_events();
@@ -190,8 +198,7 @@ void EventEngine::find_contact_states() const {
   }
 }
 
-Forces EventEngine::forces() const {
-  driver_->state_with_forces();
+Forces EventEngine::forces_of_motion() const {
   event::Motion& motion = driver_->motion();
   Forces out = model_->forces_of(reactions_, motion.joint_forces());
   const std::vector<VectorXd> forces = motion.contact_forces();

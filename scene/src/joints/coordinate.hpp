@@ -14,6 +14,9 @@ enum class MotionOf { nothing, angle, length };
 
 using namespace mechanics;
 
+/// The second body as the joint's points and axes are on it; `at_start`: at t = 0.
+Frame<double> second_at_closing(const Joint& joint, const Frame<double>& at_start);
+
 /// Hinge: the angle of the first body against the second about the axis, rad, in (-pi, pi]; slider:
 /// the way of the first body along the axis, m; distance: the distance of both points, m; ball: a
 /// component in world axes of the turn of the first body against the second since t = 0, rad.

@@ -14,15 +14,21 @@ Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
       component_(component),
       first_(bodies.index(joint.first)),
       second_(bodies.index(joint.second)),
-      at_first_(point_in(A(bodies), joint.at)),
-      at_second_(point_in(B(bodies), type(joint.kind).point_on_second(joint))) {
+      at_first_(point_in(A(bodies), joint.at)) {
+  const Frame<double> B = second_at_closing(joint, this->B(bodies));
+  at_second_ = point_in(B, type(joint.kind).point_on_second(joint));
   const Vector3d z = joint.axis.norm() > 0 ? Vector3d(joint.axis.normalized()) : Vector3d::UnitZ();
   const Vector3d x = z.unitOrthogonal(), y = z.cross(x);
   of_first_ = direction_in(A(bodies), x);
-  zero_ = direction_in(B(bodies), x);
-  ahead_ = direction_in(B(bodies), y);
-  axis_ = direction_in(B(bodies), z);
-  start_ = A(bodies).R.transpose() * B(bodies).R;
+  zero_ = direction_in(B, x);
+  ahead_ = direction_in(B, y);
+  axis_ = direction_in(B, z);
+  start_ = A(bodies).R.transpose() * B.R;
+}
+
+Frame<double> second_at_closing(const Joint& joint, const Frame<double>& at_start) {
+  if (!joint.closed) return at_start;
+  return frame_at(joint.closed->position, joint.closed->orientation.toRotationMatrix());
 }
 
 Vector3d Coordinate::place(const Bodies& bodies) const { return point<0>(A(bodies), at_first_).x; }

@@ -19,6 +19,9 @@ JointRows::JointRows(const Scene& scene, const Bodies& bodies) {
     if (row.first == row.second || (!bodies.moves(row.first) && !bodies.moves(row.second)))
       throw std::invalid_argument("joint \"" + name +
                                   "\" joins nothing that can move against each other");
+    if (joint.window)
+      throw std::invalid_argument("joint \"" + name +
+                                  "\" attaches, detaches or breaks: make_engine() has that");
     const JointType& kind = type(joint.kind);
     if (joint.motion && kind.motion() == JointType::MotionOf::nothing)
       throw std::invalid_argument("joint \"" + name + "\": a " + std::string(word(joint.kind)) +
@@ -30,7 +33,7 @@ JointRows::JointRows(const Scene& scene, const Bodies& bodies) {
       motions_.push_back(*joint.motion);
     }
     RowBuilder builder(*this, joint, row, bodies.frames[at(row.first)],
-                       bodies.frames[at(row.second)], now);
+                       second_at_closing(joint, bodies.frames[at(row.second)]), now);
     kind.add_rows(builder);
   }
   couple(scene, bodies);

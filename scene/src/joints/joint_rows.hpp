@@ -115,7 +115,7 @@ class RowBuilder {
   JointRows& rows_;
   const Joint& joint_;
   Row bodies_;
-  const Frame<double>&A_, &B_;
+  const Frame<double> A_, B_;
   const Now* now_;
   Vector3d z_, x_, y_;
 };

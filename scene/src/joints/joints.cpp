@@ -24,7 +24,8 @@ bool read_kind(files::Fields& in, Joint& joint) {
   const std::optional<JointKind> kind = in.word_of<JointKind>("kind");
   if (!kind)
     in.pass_over({"at", "axis", "length", "motion", "limits", "limits_deg", "limits_rad",
-                  "limit_restitution", "motor", "friction", "spring"});
+                  "limit_restitution", "motor", "friction", "spring", "from", "to", "break_force",
+                  "break_moment"});
   joint.kind = kind.value_or(joint.kind);
   return kind.has_value();
 }
@@ -42,7 +43,8 @@ bool one_joint(const files::Form& form, Joint& joint) {
       joints::motion_fields(in, type.motion() == JointType::MotionOf::angle, motion);
     });
   for (const Effect* each : all())
-    if (type.is_free() || (type.turns_freely() && each->acts_on_turns()))
+    if (type.is_free() || each->acts_on() == Effect::ActsOn::all_joints ||
+        (type.turns_freely() && each->acts_on() == Effect::ActsOn::turns))
       each->joint_fields(form, type.motion() != JointType::MotionOf::length, joint);
   return true;
 }

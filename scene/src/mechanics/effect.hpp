@@ -72,10 +72,11 @@ class Effect {
   virtual void fields(const files::Form& /*root*/, Scene&) const {}
   virtual void scene_fields(const files::Form&, Scene&) const {}
   virtual void body_fields(const files::Form&, Body&) const {}
-  /// `angle`: the joint turns; else it slides. Of joints with a free coordinate, and of balls if
-  /// the effect acts on their turns.
+  /// `angle`: the joint turns; else it slides. Of the joints that the effect acts on: those with a
+  /// free coordinate, those whose turns are free, or all.
   virtual void joint_fields(const files::Form&, bool /*angle*/, Joint&) const {}
-  virtual bool acts_on_turns() const { return false; }
+  enum class ActsOn { coordinates, turns, all_joints };
+  virtual ActsOn acts_on() const { return ActsOn::coordinates; }
   virtual void pair_fields(const files::Form&, Pair&) const {}
   /// Checks across the fields of a scene.
   virtual void check(const Scene&, files::Report&) const {}

@@ -68,6 +68,15 @@ struct Frame {
   Matrix3<S> R;
 };
 
+/// A body at rest.
+inline Frame<double> frame_at(const Vector3d& position, const Matrix3d& R) {
+  Frame<double> f;
+  f.v = f.W = f.a = f.alpha = Vector3d::Zero();
+  f.x = position;
+  f.R = R;
+  return f;
+}
+
 inline Matrix3d skew(const Vector3d& u) {
   Matrix3d K;
   K << 0, -u.z(), u.y(), u.z(), 0, -u.x(), -u.y(), u.x(), 0;

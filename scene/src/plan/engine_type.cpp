@@ -3,6 +3,8 @@
 
 #include <tether/scene/words.hpp>
 
+#include "switching/switching.hpp"
+
 namespace tether::scene {
 
 #define ENGINE(name) const EngineType& name##_engine();
@@ -21,7 +23,7 @@ const EngineType& engine_type(EngineKind kind) {
 }
 
 std::unique_ptr<Engine> make_engine(const Scene& scene, const Plan& plan) {
-  return engine_type(plan.engine).make(scene);
+  return with_switching(scene, engine_type(plan.engine).make);
 }
 
 std::unique_ptr<Engine> make_engine(const Scene& scene) {

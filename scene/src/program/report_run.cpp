@@ -109,6 +109,17 @@ void print_hand_overs(const Scene& scene, const RunResult& r) {
                r.hand_overs.size() - kTold, r.hand_overs.back().time);
 }
 
+void print_joint_events(const Scene& scene, const RunResult& r) {
+  for (std::size_t k = 0; k < std::min(kTold, r.joint_events.size()); ++k) {
+    const ContactEvent& each = r.joint_events[k];
+    fmt::print("  {:<12} {} at {:.9g} s{}\n", name(each.kind),
+               scene.joints[static_cast<std::size_t>(each.joint)].name, each.time,
+               each.lost != 0 ? fmt::format(", its impulse takes {:.6g} J", each.lost) : "");
+  }
+  if (r.joint_events.size() > kTold)
+    fmt::print("               and {} more\n", r.joint_events.size() - kTold);
+}
+
 void print_work(const Scene& scene, const Summary& s, const Counts& c) {
   if (c.contact_problems > 0) {
     fmt::print("  contacts     at most {}; penetration {:.2e} m; residual {:.2e}\n", s.contacts,
@@ -145,6 +156,7 @@ void print_summary(const Scene& scene, const RunResult& r) {
   fmt::print(
       "  energy       {:.9g} J at the start, {:.9g} J at the end; change {:.2e} to {:.2e} J\n",
       s.start_energy, s.end_energy, s.lowest_change, s.largest_change);
+  print_joint_events(scene, r);
   if (r.engine == "event") print_events(s, r.counts_of_events);
   print_hand_overs(scene, r);
   if (r.engine != "event" || !r.hand_overs.empty()) print_work(scene, s, c);

@@ -10,6 +10,7 @@
 #include "record/formats.hpp"
 #include "saved_state.hpp"
 #include "stepping/stepping_engine.hpp"
+#include "switching/switching.hpp"
 
 namespace tether::scene {
 
@@ -52,7 +53,9 @@ Plan checked_plan(const Scene& scene) {
 std::unique_ptr<Engine> engine_of(const Scene& scene, const Plan& plan, contact::SolverTeam* team) {
   if (!team) return make_engine(scene, plan);
   if (plan.engine == EngineKind::stepping)
-    return std::make_unique<stepping::SteppingEngine>(scene, team);
+    return with_switching(scene, [team](const Scene& of) -> std::unique_ptr<Engine> {
+      return std::make_unique<stepping::SteppingEngine>(of, team);
+    });
   throw std::invalid_argument(fmt::format(
       "several processes share steps with impulses; this scene is moved by the engine \"{}\", in "
       "one process ({})",
@@ -229,6 +232,8 @@ class Run {
     result_.time = engine_->time();
     result_.counts = engine_->counts();
     result_.hand_overs = engine_->hand_overs();
+    for (const ContactEvent& each : engine_->events())
+      if (is_of_joint(each.kind)) result_.joint_events.push_back(each);
     result_.counts_of_events = engine_->counts_of_events();
     result_.costs = engine_->costs();
     result_.judgements = judge_.judgements();

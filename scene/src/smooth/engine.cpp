@@ -32,7 +32,9 @@ class SmoothEngine : public Engine {
       : units_(units_of(scene)),
         scene_(in_units(scene, units_)),
         options_(scene_.smooth.value_or(SmoothOptions{})),
-        system_(std::make_unique<System>(scene_, units_)) {
+        start_time_(scene_.start ? scene_.start->time : 0),
+        system_(std::make_unique<System>(scene_, units_)),
+        reactions_(scene_, mechanics::placed_bodies(scene_)) {
     options_.max_step = effects::longest_step(scene_, options_.max_step);
     bodies_.resize(scene.bodies.size());
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
@@ -41,15 +43,15 @@ class SmoothEngine : public Engine {
     }
     y_ = system_->start_state();
     check_start(kStartTolerance, kStartTolerance, "is taken for rounding");
-    system_->complete(0.0, y_, yp_);
+    system_->complete(start_time_, y_, yp_);
     if (system_->constraint_count() > 0) {
       SmoothOptions with = options_;
       with.projection = true;
       // Invariants keep the values of the start once it is consistent.
-      system_->keep_invariants_of(0.0, y_);
+      system_->keep_invariants_of(start_time_, y_);
       for (int pass = 0; pass < 2; ++pass) {
-        Integrator start(*system_, with, 0.0, y_, yp_, Integrator::For::start);
-        const ida_projection::ConsistencyReport report = start.make_consistent(0.0);
+        Integrator start(*system_, with, start_time_, y_, yp_, Integrator::For::start);
+        const ida_projection::ConsistencyReport report = start.make_consistent(start_time_);
         if (report.status == ida_projection::Status::not_converged &&
             report.drift_before <= kRounding * std::max(1.0, y_.lpNorm<Eigen::Infinity>()))
           break;
@@ -57,11 +59,11 @@ class SmoothEngine : public Engine {
           throw std::invalid_argument("the start of the scene contradicts its joints: " +
                                       report.message);
         y_ = start.y();
-        system_->keep_invariants_of(0.0, y_);
+        system_->keep_invariants_of(start_time_, y_);
       }
       check_start(kLeft, kSpeedLeft, "may be left where joints contradict each other in a loop");
     }
-    renew(0.0, y_, std::vector<double>(system_->kept()));
+    renew(start_time_, y_, std::vector<double>(system_->kept()));
   }
 
   const char* name() const override { return "smooth"; }
@@ -70,7 +72,12 @@ class SmoothEngine : public Engine {
   void advance(double t) override {
     long steps_left = options_.max_steps;
     const auto stop = [this] { return interrupted(); };
-    while (!integrator_->advance(t / units_.time, steps_left, stop) && !interrupted()) anchor();
+    integrator_->stop_above(excess_of_state());
+    while (!integrator_->advance(t / units_.time, steps_left, stop) && !interrupted() &&
+           !integrator_->is_above()) {
+      anchor();
+      integrator_->stop_above(excess_of_state());
+    }
     update_bodies();
   }
 
@@ -82,10 +89,7 @@ class SmoothEngine : public Engine {
   }
   const std::vector<ContactState>& contacts() const override { return no_contacts_; }
   scene::Forces forces() const override {
-    const joints::Reactions reactions(scene_, mechanics::placed_bodies(scene_));
-    scene::Forces out = system_->forces(integrator_->time(), integrator_->y().data(), reactions);
-    to_si(units_, scene_, out);
-    return out;
+    return forces_at(integrator_->time(), integrator_->y().data());
   }
 
   Counts counts() const override {
@@ -131,6 +135,16 @@ class SmoothEngine : public Engine {
   }
 
  private:
+  scene::Forces forces_at(double t, const double* y) const {
+    scene::Forces out = system_->forces(t, y, reactions_);
+    to_si(units_, scene_, out);
+    return out;
+  }
+  Integrator::OfState excess_of_state() const {
+    if (!excess()) return {};
+    return [this](double t, const Eigen::VectorXd& y) { return excess()(forces_at(t, y.data())); };
+  }
+
   void exchange(binary::Archive io, double& from, double& to, Eigen::VectorXd& y,
                 Eigen::VectorXd& now, std::vector<double>& kept) const {
     auto size = static_cast<std::uint64_t>(y.size()), invariants = std::uint64_t{kept.size()};
@@ -209,7 +223,7 @@ class SmoothEngine : public Engine {
     const int m = system_->rows();
     if (m == 0) return;
     Eigen::VectorXd g(2 * m);
-    system_->joint_values(0.0, y_.data(), g.data());
+    system_->joint_values(start_time_, y_.data(), g.data());
     double size = 1, speed = 1;
     for (int k = 0; k < system_->moving(); ++k) {
       size = std::max(size, y_.segment<3>(kBody * k + kPosition).norm());
@@ -224,9 +238,10 @@ class SmoothEngine : public Engine {
       const double unit = half == 0 ? units_.length : units_.speed();
       throw std::invalid_argument(fmt::format(
           "the start of the scene contradicts the {} of joint \"{}\": its bodies are off by {:.3g} "
-          "{} at t = 0 (at most {:.3g} {}){}",
+          "{} at t = {:g} (at most {:.3g} {}){}",
           half == 0 ? "position" : "velocity", system_->joint_of_row(worst),
-          unit * g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s", unit * allowed, why,
+          unit * g[half * m + worst], half == 0 ? "m or rad" : "m/s or rad/s",
+          units_.time * start_time_, unit * allowed, why,
           half == 0 ? ""
                     : "; give both bodies velocities and angular velocities that the joint "
                       "allows, and those of a prescribed motion"));
@@ -236,7 +251,9 @@ class SmoothEngine : public Engine {
   Units units_;
   Scene scene_;  // in these units, as everything here but bodies_
   SmoothOptions options_;
+  double start_time_;
   std::unique_ptr<System> system_;  // its workspace changes in diagnostics, too
+  joints::Reactions reactions_;
   double anchor_ = 0;
   Eigen::VectorXd y_, yp_;  // at the anchor
   std::unique_ptr<Integrator> integrator_;

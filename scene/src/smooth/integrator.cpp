@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include "integrator.hpp"
 #include "bounds.hpp"
+#include "mechanics/roots.hpp"
 
 #include <sunlinsol/sunlinsol_spgmr.h>
 
@@ -138,19 +139,29 @@ ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
 
 // Step by step up to t. IDA's own way to an output time takes the same steps.
 int Integrator::step_past(double t, long& steps_left, const std::function<bool()>& interrupted) {
-  while (step_end() < t && !anchor_is_due() && !(interrupted && interrupted())) {
+  while (step_end() < std::min(t, above_from_) && !anchor_is_due() &&
+         !(interrupted && interrupted())) {
     if (steps_left <= 0) {
       context_.message() =
           "max_steps = " + std::to_string(options_.max_steps) + " steps are taken.";
       return IDA_TOO_MUCH_WORK;
     }
     const long before = steps();
+    const double begin = step_end();
     const double kink = system_.next_kink(step_end());
     if (std::isfinite(kink))  // no step passes over one
       session_->check(IDASetStopTime(session_->ida(), kink), "IDASetStopTime");
     const int flag = session_->solve(t, t_, IDA_ONE_STEP);
     if (flag < 0) return flag;
     steps_left -= steps() - before;
+    if (excess_)
+      above_from_ = first_above(
+          [&](double time) {
+            Eigen::VectorXd y;
+            session_->at(time, y);
+            return excess_(time, y);
+          },
+          begin, step_end());
   }
   return IDA_SUCCESS;
 }
@@ -160,7 +171,7 @@ bool Integrator::advance(double t, long& steps_left, const std::function<bool()>
   const double begin = now();
   const double from = t_;
   int flag = step_past(t, steps_left, interrupted);
-  const double to = std::min(t, step_end());
+  const double to = std::min({t, step_end(), above_from_});
   if (flag == IDA_SUCCESS && to > from) {
     flag = session_->solve(to, t_, IDA_NORMAL);
     // IDA has nothing to do where its last step has just ended and leaves y as the corrector summed
@@ -169,6 +180,9 @@ bool Integrator::advance(double t, long& steps_left, const std::function<bool()>
     // y' between steps is not used.
     if (session_->projection() != nullptr && flag >= 0)
       session_->projection()->project(t_, session_->y(), nullptr);
+  } else if (flag == IDA_SUCCESS && step_end() > to) {  // it is above at once
+    t_ = to;
+    IDAGetDky(session_->ida(), to, 0, session_->y());
   }
   spent_.total += now() - begin;
   if (flag < 0) throw SimulationError(failure(flag));

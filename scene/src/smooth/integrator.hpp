@@ -27,6 +27,10 @@ class Integrator {
   /// anchor, or where `interrupted`. `steps_left` counts down; at 0, as for any failure of IDA,
   /// SimulationError.
   bool advance(double t, long& steps_left, const std::function<bool()>& interrupted);
+  /// From here on it stands where a function of (t, y) is above 0 first; empty: nowhere.
+  using OfState = std::function<double(double, const Eigen::VectorXd&)>;
+  void stop_above(OfState excess) { excess_ = std::move(excess); }
+  bool is_above() const { return above_from_ <= t_; }
   double time() const { return t_; }
   /// The end of the last step, which may lie beyond time().
   bool anchor_is_due() const;
@@ -60,6 +64,8 @@ class Integrator {
   System& system_;
   SmoothOptions options_;
   double t_;
+  OfState excess_;
+  double above_from_ = kInfinity;
   double tolerance_;  // of a step
   Eigen::VectorXd absolute_;
   QuietContext context_;

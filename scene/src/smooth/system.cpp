@@ -11,8 +11,8 @@ System::System(const Scene& scene, const Units& units)
       units_(units),
       bodies_(scene),
       rows_(scene, bodies_.all()),
-      in_use_(rows_, bodies_),
       forces_(effects::make_forces(scene, bodies_.all())),
+      in_use_(rows_, bodies_),
       invariants_(scene, bodies_, forces_, first_work()),
       dynamics_(rows_, bodies_, form_ == Formulation::index0),
       terms_{bodies_, rows_, forces_} {

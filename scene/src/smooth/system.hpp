@@ -129,8 +129,8 @@ class System {
   Units units_;
   MovingBodies bodies_;
   JointRows rows_;
-  RowsInUse in_use_;
   Forces forces_;
+  RowsInUse in_use_;  // moves the bodies, where they are at t = 0 until then
   KeptInvariants invariants_;
   ForwardDynamics dynamics_;
   JacobianTerms terms_;

@@ -86,9 +86,21 @@ Scene in_units(const Scene& scene, const Units& u) {
     for (Pair& pair : out.pairs) each->pair_fields(form, pair);
     each->fields(form, out);
   }
+  for (Joint& joint : out.joints)
+    if (joint.closed) joint.closed->position /= u.length;
+  if (out.start) {
+    out.start->time /= u.time;
+    for (BodyState& body : out.start->bodies) from_si(u, body);
+  }
   if (out.smooth) out.smooth->max_step /= u.time;
   if (out.event) out.event->max_step /= u.time;
   return out;
+}
+
+void from_si(const Units& u, BodyState& body) {
+  body.position /= u.length;
+  body.velocity /= u.speed();
+  body.angular_velocity *= u.time;
 }
 
 void to_si(const Units& u, BodyState& body) {

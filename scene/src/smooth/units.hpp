@@ -19,6 +19,7 @@ Scene in_units(const Scene& scene, const Units& units);
 
 /// Back to SI. `drift` is in SI already: its parts have several units.
 void to_si(const Units& units, BodyState& body);
+void from_si(const Units& units, BodyState& body);
 void to_si(const Units& units, Diagnostics& diagnostics);
 void to_si(const Units& units, const Scene& scene, scene::Forces& forces);
 
@@ -80,7 +81,10 @@ inline Scene seen_from(const Eigen::Vector3d& origin, Scene scene) {
   for (Joint& joint : scene.joints) {
     joint.at -= origin;
     joint.at_second -= origin;
+    if (joint.closed) joint.closed->position -= origin;
   }
+  if (scene.start)
+    for (BodyState& body : scene.start->bodies) body.position -= origin;
   for (Spring& spring : scene.springs) {
     spring.at -= origin;
     spring.at_second -= origin;

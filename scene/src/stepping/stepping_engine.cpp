@@ -191,6 +191,7 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
   if (any_of(scene.bodies, [](const Body& body) { return body.surface.has_value(); }))
     for (const Body& body : scene.bodies) surface_.push_back(body.surface.value_or(SurfaceSpeed{}));
   add_forces(scene);
+  if (scene.start) begin_at(scene.start->time, scene.start->bodies);
   read_bodies();
 }
 
@@ -216,8 +217,11 @@ void SteppingEngine::add_forces(const Scene& scene) {
 
 void SteppingEngine::advance(double t) {
   const double slack = kSameBoundary * std::min(stepper_.options().step, t);
-  bool moved = false;
-  for (; time() < t - slack && !interrupted(); moved = true) take_step();
+  bool moved = false, above = false;
+  for (; time() < t - slack && !above && !interrupted(); moved = true) {
+    take_step();
+    above = excess() && excess()(forces()) > 0;
+  }
   if (moved) read_bodies();
 }
 

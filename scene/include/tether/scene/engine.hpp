@@ -18,19 +18,6 @@
 TETHER_EXPORT_BEGIN
 namespace tether::scene {
 
-/// A body at Engine::time(), world axes.
-struct BodyState {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of the centre of mass, m
-  linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; body to world
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();               ///< of the centre of mass, m/s
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< rad/s
-  /// Neither NaN nor infinity.
-  bool is_finite() const {
-    return position.allFinite() && orientation.coeffs().allFinite() && velocity.allFinite() &&
-           angular_velocity.allFinite();
-  }
-};
-
 /// A contact at Engine::time(), world axes; indices as Scene::bodies.
 struct ContactState {
   int first = -1, second = -1;  ///< bodies
@@ -72,7 +59,8 @@ struct Forces {
   std::vector<Eigen::Vector3d> contact, contact_moment;
 };
 
-/// A change of one contact at an instant of the event engine. An instant may have several.
+/// A change of one contact at an instant of the event engine, or of a joint in any engine. An
+/// instant may have several.
 struct ContactEvent {
   /// The change.
   enum class Kind : std::uint8_t {
@@ -87,7 +75,10 @@ struct ContactEvent {
     hand_over,  ///< steps take over from here on; of no contact
     resume,     ///< events go on; `lost` is what the steps took. Of no contact
     roll,       ///< a contact begins to roll or spin against its moment of friction
-    roll_stop   ///< it rolls or spins no longer
+    roll_stop,  ///< it rolls or spins no longer
+    attach,     ///< a joint closes; `lost` is what its impulse takes
+    detach,     ///< a joint opens
+    snap        ///< a joint breaks
   };
   double time = 0;               ///< s
   Kind kind = Kind::impact;      ///< of the change
@@ -95,10 +86,12 @@ struct ContactEvent {
   double before = 0, after = 0;  ///< normal velocities of an impact, m/s
   double lost = 0;               ///< energy of all contacts of the instant, in its first event, J
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on `first`, world axes, N s
-  int joint = -1;                                     ///< whose limit, motor or friction; -1: none
+  int joint = -1;  ///< that changes, or whose limit, motor or friction it is; -1: none
 };
 /// The enumerator as text.
 const char* name(ContactEvent::Kind kind);
+/// Whether a joint attaches, detaches or breaks.
+constexpr bool is_of_joint(ContactEvent::Kind kind) { return kind >= ContactEvent::Kind::attach; }
 
 /// Conserved quantities and errors at Engine::time(), SI.
 struct Diagnostics {
@@ -197,13 +190,19 @@ class Engine {
 
   /// Called after every step; if it returns true, advance() returns at the end of that step.
   void stop_when(std::function<bool()> interrupted) { interrupted_ = std::move(interrupted); }
+  /// advance() returns where a function of forces() is above 0: smooth and events at the first such
+  /// time to their tolerance, stepping at the end of the step.
+  void stop_above(std::function<double(const Forces&)> excess) { excess_ = std::move(excess); }
 
  protected:
   /// Asks the function of stop_when().
   bool interrupted() const { return interrupted_ && interrupted_(); }
+  /// The function of stop_above(); empty: none.
+  const std::function<double(const Forces&)>& excess() const { return excess_; }
 
  private:
   std::function<bool()> interrupted_;
+  std::function<double(const Forces&)> excess_;
 };
 
 /// All of Forces.

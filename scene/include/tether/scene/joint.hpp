@@ -5,9 +5,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tether/linalg/eigen.hpp>
 #include <utility>
 #include <vector>
 
@@ -67,6 +69,24 @@ struct JointSpring {
   std::vector<std::array<double, 2>> stiffness_table = {}, damping_table = {};
 };
 
+/// When a joint holds, and what it bears. It closes as its bodies are at `from`, by an impulse.
+struct JointWindow {
+  /// The time that does not come, s; the bound that nothing reaches, N, N m.
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  double from = 0, to = kNever;  ///< s
+  /// It breaks, for good, where its force or moment (see JointForce) reaches these: N, N m.
+  double break_force = kNever, break_moment = kNever;
+
+  /// Whether it can break.
+  bool breaks() const { return break_force < kNever || break_moment < kNever; }
+};
+
+/// A place and an attitude, world axes.
+struct Pose {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< m
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; body to world
+};
+
 /// Couples the angles and ways s of hinges and sliders, which are 0 at t = 0. The sum of weight s
 /// is 0, or, of two joints, s_1 = polynomial(s_2), coefficients from degree 1 on.
 struct Coupling {
@@ -102,6 +122,10 @@ struct Joint {
   Place place;          ///< in the file
   /// Universal only: the arm of the cross on `second`, at right angles to `axis`, that on `first`.
   Eigen::Vector3d axis_second = Eigen::Vector3d::UnitX();
+  std::optional<JointWindow> window = {};  ///< absent: it holds always and bears everything
+  /// The second body at closing, seen with the first one at its place of t = 0: points and axes are
+  /// on it from there. Not of files; absent: as at t = 0.
+  std::optional<Pose> closed = {};
 };
 
 }  // namespace tether::scene

@@ -66,14 +66,15 @@ struct RunResult {
   double whole_wall = 0, whole_seconds = 0;  ///< of the whole run, with what it records
   std::string failure;                       ///< why the run could not go on; empty: it could
   bool interrupted = false;                  ///< RunOptions::interrupted ended it
-  std::vector<HandOver> hand_overs;   ///< from events to steps, and back; see Engine::hand_overs()
-  Counts counts_of_events;            ///< with hand-overs; `counts` has those of steps then
-  Summary summary;                    ///< over all records
-  Counts counts;                      ///< of the engine
-  std::vector<EffectCost> costs;      ///< of each effect
-  std::vector<Judgement> judgements;  ///< one for each Scene::expect
-  std::vector<std::string> written;   ///< files
-  std::vector<std::string> remarks;   ///< data that the files do not contain
+  std::vector<HandOver> hand_overs;  ///< from events to steps, and back; see Engine::hand_overs()
+  std::vector<ContactEvent> joint_events;  ///< joints that attach, detach and break
+  Counts counts_of_events;                 ///< with hand-overs; `counts` has those of steps then
+  Summary summary;                         ///< over all records
+  Counts counts;                           ///< of the engine
+  std::vector<EffectCost> costs;           ///< of each effect
+  std::vector<Judgement> judgements;       ///< one for each Scene::expect
+  std::vector<std::string> written;        ///< files
+  std::vector<std::string> remarks;        ///< data that the files do not contain
   std::vector<std::string>
       warnings;  ///< why the motion is not to be trusted, or the start was not meant
 

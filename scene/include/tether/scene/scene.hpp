@@ -39,6 +39,25 @@ struct SurfaceSpeed {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s
 };
 
+/// The motion of a body at an instant, world axes.
+struct BodyState {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of the centre of mass, m
+  linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; body to world
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();               ///< of the centre of mass, m/s
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< rad/s
+  /// Neither NaN nor infinity.
+  bool is_finite() const {
+    return position.allFinite() && orientation.coeffs().allFinite() && velocity.allFinite() &&
+           angular_velocity.allFinite();
+  }
+};
+
+/// A state that a run begins with.
+struct SceneStart {
+  double time = 0;                ///< s
+  std::vector<BodyState> bodies;  ///< as Scene::bodies
+};
+
 /// A rigid body at t = 0.
 struct Body {
   std::string name;                                    ///< unique
@@ -300,6 +319,8 @@ struct Scene {
   Output output;                            ///< files that a run writes
   std::vector<Expect> expect;               ///< what a run must find
   std::vector<std::string> surface_files;   ///< that were read with it; no output replaces them
+  /// In place of the bodies at t = 0, to which joints and springs refer all the same. Not of files.
+  std::optional<SceneStart> start;
 
   /// Whether a body can; -1, the world, cannot.
   bool moves(int body) const { return body >= 0 && !bodies[linalg::at(body)].fixed; }

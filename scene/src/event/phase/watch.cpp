@@ -4,6 +4,7 @@
 #include "bounds.hpp"
 #include "event/model/features.hpp"
 #include "friction_solve.hpp"
+#include "mechanics/roots.hpp"
 
 namespace tether::scene::event {
 
@@ -21,28 +22,11 @@ constexpr double kUnseen = 5;        // of the band of approach: impacts that ma
 // Errors of accelerations: by the contact library's tolerance, and by the large slip S.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
-/// A zero of f between a and b, where it has other signs; Illinois' rule.
+/// A zero of f between a and b, where it has other signs.
 template <class F>
 double zero_between(const F& f, double a, double fa, double b, double fb, double resolution) {
-  int side = 0;
-  for (int k = 0; k < kMostIterations && std::abs(b - a) > resolution; ++k) {
-    double m = (fa * b - fb * a) / (fa - fb);
-    if (!(m > std::min(a, b) && m < std::max(a, b))) m = 0.5 * (a + b);
-    const double fm = f(m);
-    if (fm == 0) return m;
-    if ((fm > 0) == (fb > 0)) {
-      b = m;
-      fb = fm;
-      if (side == -1) fa *= 0.5;
-      side = -1;
-    } else {
-      a = m;
-      fa = fm;
-      if (side == 1) fb *= 0.5;
-      side = 1;
-    }
-  }
-  return std::abs(fa) < std::abs(fb) ? a : b;
+  const mechanics::Bracket at = mechanics::narrowed(f, {a, fa, b, fb}, resolution);
+  return std::abs(at.fa) < std::abs(at.fb) ? at.a : at.b;
 }
 
 /// The first time from which on f is negative, between a and b where it is; up to there it is flat,

@@ -209,7 +209,7 @@ class JointSpringEffect : public JointLawEffect {
  public:
   JointSpringEffect() : JointLawEffect("joint springs", has_spring) {}
   bool has_joint_laws(const Scene&) const override { return false; }
-  bool acts_on_turns() const override { return true; }
+  ActsOn acts_on() const override { return ActsOn::turns; }
 
   void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
     const bool is_free = joints::type(joint.kind).is_free();

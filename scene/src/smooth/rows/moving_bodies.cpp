@@ -34,11 +34,14 @@ MovingBodies::MovingBodies(const Scene& scene) : bodies_(mechanics::placed_bodie
     bodies_.inertia[b] = inertia_of(body);
     bodies_.inertia[b].slot = bodies_.moving++;
     body_of_slot_.push_back(static_cast<int>(b));
-    const Eigen::Quaterniond q = body.orientation.normalized();
-    const Vector3d w = bodies_.frames[b].R.transpose() * body.angular_velocity;
-    for (int k = 0; k < 3; ++k) start_.push_back(body.position[k]);
+    const BodyState begins = scene.start ? scene.start->bodies[b]
+                                         : BodyState{body.position, body.orientation.normalized(),
+                                                     body.velocity, body.angular_velocity};
+    const Eigen::Quaterniond& q = begins.orientation;
+    const Vector3d w = q.toRotationMatrix().transpose() * begins.angular_velocity;
+    for (int k = 0; k < 3; ++k) start_.push_back(begins.position[k]);
     start_.insert(start_.end(), {q.w(), q.x(), q.y(), q.z()});
-    for (int k = 0; k < 3; ++k) start_.push_back(body.velocity[k]);
+    for (int k = 0; k < 3; ++k) start_.push_back(begins.velocity[k]);
     for (int k = 0; k < 3; ++k) start_.push_back(w[k]);
   }
   if (bodies_.moving == 0) throw std::invalid_argument("the scene has no body that can move");

@@ -22,7 +22,7 @@ class MovingBodies {
   const Frame<double>& frame(int slot) const { return bodies_.frames[at(body(slot))]; }
   Frame<double>& frame(int slot) { return bodies_.frames[at(body(slot))]; }
   const Vector3d& spin(int slot) const { return bodies_.w[at(body(slot))]; }  ///< body axes
-  const std::vector<double>& start() const { return start_; }                 ///< y at t = 0
+  const std::vector<double>& start() const { return start_; }  ///< y at the start of a run
 
   void set_time(double t) { bodies_.time = t; }
   void begin_anew(double t) { bodies_.since = t; }

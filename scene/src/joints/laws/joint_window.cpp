@@ -1,0 +1,85 @@
+// Tether: joints that attach, detach and break. SPDX-License-Identifier: BSD-3-Clause
+//
+// The engine of switching/ moves them; here are their fields.
+
+#include "joints/joint_type.hpp"
+#include "mechanics/effect.hpp"
+
+namespace tether::scene::effects {
+
+using namespace mechanics;
+
+namespace {
+
+constexpr Unit kSeconds{"s", 0, 0, 1};
+constexpr const char* kKeys[] = {"from", "to", "break_force", "break_moment"};
+
+bool has_window(const Joint& joint) { return joint.window.has_value(); }
+bool switches(const Joint& joint) {
+  return joint.window && (joint.window->from > 0 || std::isfinite(joint.window->to));
+}
+bool breaks(const Joint& joint) { return joint.window && joint.window->breaks(); }
+
+class JointWindowEffect : public Effect {
+ public:
+  ActsOn acts_on() const override { return ActsOn::all_joints; }
+
+  void joint_fields(const files::Form& form, bool, Joint& joint) const override {
+    files::Fields* const in = form.in();
+    if (in && !joint.window && any_of(kKeys, [&](const char* key) { return in->has(key); }))
+      joint.window.emplace();
+    if (!joint.window) return;
+    JointWindow& w = *joint.window;
+    const auto number = [&](const char* key, double& x, const Unit& unit) {
+      if (in ? in->has(key) : std::isfinite(x)) form.number(key, x, files::kPositive, unit);
+    };
+    form.number("from", w.from, files::kNotNegative, kSeconds);
+    number("to", w.to, kSeconds);
+    number("break_force", w.break_force, kForce);
+    number("break_moment", w.break_moment, kMoment);
+    if (in && w.from > 0)
+      for (const char* key : {"length", "motion"})
+        if (in->has(key))
+          in->wrong(key,
+                    "is of a joint that holds from the start: one that attaches later takes "
+                    "its bodies as they are then");
+    const bool has_moment = joint.kind != JointKind::distance &&
+                            (joint.kind != JointKind::ball || joint.spring.has_value());
+    if (in && in->has("break_moment") && !has_moment)
+      in->wrong("break_moment",
+                "is of a joint that has moments: a distance, and a ball without a "
+                "spring, has none");
+  }
+
+  void check(const Scene& scene, files::Report& report) const override {
+    if (!any_of(scene.joints, has_window)) return;
+    for (const Joint& joint : scene.joints) {
+      if (!joint.window || joint.window->to > joint.window->from) continue;
+      report.add(joint.place, fmt::format("joint \"{}\": to", joint.name),
+                 fmt::format("{}", joint.window->to),
+                 fmt::format("must be after from, {} s", joint.window->from));
+    }
+    for (const Coupling& coupling : scene.couplings)
+      for (const int j : coupling.joints)
+        if (scene.joints[at(j)].window)
+          report.add(coupling.place, fmt::format("coupling \"{}\": joints", coupling.name),
+                     fmt::format("\"{}\"", scene.joints[at(j)].name),
+                     "attaches, detaches or breaks; the joints of a coupling hold always");
+    if (goes_on_in_steps(scene))
+      report.add(scene.joints.front().place, "event: otherwise", "\"stepping\"",
+                 "is not for scenes whose joints attach, detach or break");
+  }
+
+  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+    const auto switching = count_if(scene.joints, switches);
+    const auto breaking = count_if(scene.joints, breaks);
+    if (switching > 0) lines.push_back({"attach, detach", counted(switching, "joint")});
+    if (breaking > 0) lines.push_back({"breaking", counted(breaking, "joint")});
+  }
+};
+
+}  // namespace
+
+TETHER_EFFECT(joint_window, JointWindowEffect)
+
+}  // namespace tether::scene::effects
