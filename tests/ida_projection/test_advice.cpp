@@ -126,7 +126,7 @@ TEST_CASE("a long collapse is explained once, restarts and all") {
   }
   const std::string printed = captured.text();
   INFO(printed);
-  CHECK(count(printed, "IDA rejected") == 1);
+  CHECK(count(printed, "IDA rejected") + count(printed, "each of the last") == 1);
   CHECK(count(printed, "at t = ") == 1);  // what the first steps of the first run have shown
   CHECK(count(printed, "tether:") == 2);
 }

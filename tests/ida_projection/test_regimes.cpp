@@ -225,7 +225,7 @@ TEST_CASE("forms of index 2 close to rounding: multipliers in Newton's test fail
   tested.suppress_algebraic = false;
   const Run failed = integrate(problem, 1e-8, rows, tested, false);
   REQUIRE(failed.flag < 0);
-  CHECK(failed.status == tp::Status::corrector_failed);
+  CHECK((failed.status == tp::Status::corrector_failed || failed.status == tp::Status::collapsed));
   CHECK(failed.message.find("index 1 or 0") != std::string::npos);
   const Run run = integrate(problem, 1e-12, rows, {}, false);
   REQUIRE(run.flag >= 0);

@@ -7,9 +7,9 @@ namespace tether::ida_projection {
 
 // Whether the metric may be changed and the response of F is available.
 bool Projection::Impl::may_change_metric() const {
-  return in_use(Mechanism::other_metric) && movers_.used->rows().traits.many &&
-         movers_.used->rows().may_use_levels() && wanted_metric_ == Metric::automatic &&
-         options_.group.empty() && options_.advanced.metric == Metric::local_correction &&
+  return in_use(Mechanism::other_metric) && movers_.used->rows().may_use_levels() &&
+         wanted_metric_ == Metric::automatic && options_.group.empty() &&
+         options_.advanced.metric == Metric::local_correction &&
          movers_.used == movers_.own.get() && unknowns_.contiguous &&
          polish_.is_response_available();
 }

@@ -211,8 +211,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   // flag is kept by the corrector and ends the run.
   const Fix after = polishes ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
   moved.corrector_was_right = after.corrector_was_right;
-  moved.status = after.made ? movers_.used->settle(candidate, polish_.delta())
-                            : movers_.used->finish(candidate);
+  if (after.made) moved.status = movers_.used->settle(candidate, polish_.delta());
   return moved;
 }
 
@@ -220,10 +219,9 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
 // response of F to the move is then left out, so that this order is not taken where IDA's error
 // test of algebraic variables needs the response.
 bool Projection::Impl::polishes_first() {
-  if (!movers_.used->rows().traits.many) return false;
   if (!in_use(Mechanism::polish_first) ||
       attempts_.last_move > polish_.longest_without_response(control_.smoothing()) ||
-      control_.tests_algebraic() || !movers_.used->rows().may_polish_first())
+      control_.tests_algebraic())
     return false;
   const bool silent = metric_choice_.calm() || !may_change_metric();
   return silent && wants_polish(0.0);

@@ -16,9 +16,6 @@ constexpr double kStaleRowsSafety = 4.0;  // factor for C of an earlier step
 constexpr int kMostTests = 16;            // candidates tested with the factors of an earlier one
 constexpr int kUnneededMoves = 8;         // moves below kNothing in a row, then tests begin again
 constexpr int kUsualMoves = 3;            // moves with a C that is renewed in each
-// This part of Options::tolerance is left where a move costs little beside the factors.
-constexpr double kCheapRest = 1e-4;
-constexpr double kLeft = 0.03;  // part of a first move that it leaves, until curvature is measured
 
 }  // namespace
 
@@ -67,7 +64,7 @@ Status Mover::factor(double t, bool refill) {
 }
 
 double Mover::remaining_drift(const Candidate& candidate) {
-  if (!rows_->traits.gives_g) return -1.0;
+  if (!rows_->gives_g()) return -1.0;
   rows_->restart(candidate);
   return rows_->value(candidate.t, false) == Status::success ? rows_->drift() : -1.0;
 }
@@ -90,8 +87,7 @@ Move Mover::measure(const Candidate& candidate) {
   result.status = rows_->value(candidate.t, !may_do);
   if (result.status != Status::success) return result;
   result.drift_before = result.drift_after = rows_->drift();
-  if (rows_->traits.gives_g && (result.drift_before == 0.0 || clearly_needs_no_move()))
-    return result;
+  if (rows_->gives_g() && (result.drift_before == 0.0 || clearly_needs_no_move())) return result;
   tests_ = 0;
   if ((result.status = factor(candidate.t, true)) != Status::success) return result;
   if (rows_->rounding_only()) return result;
@@ -158,7 +154,7 @@ void Mover::newton(const Candidate& candidate, Move& result) {
       if (!(found.length <= options_.advanced.largest_move) && !allowed(candidate, result)) return;
     }
     if ((result.status = rows_->apply(1.0, candidate)) != Status::success) return;
-    if (!rows_->traits.gives_g) break;
+    if (!rows_->gives_g()) break;
     if (result.moves == 1 && found.left == 0.0 && monitor_.plainly_done(found.length)) break;
     Monitor::Verdict verdict = Monitor::Verdict::done;
     if (done(candidate, found, fresh, result, verdict)) break;
@@ -228,16 +224,9 @@ Status Mover::settle(const Candidate& candidate, N_Vector change) {
   return remove_rest(candidate, move_length_ + moved);
 }
 
-Status Mover::finish(const Candidate& candidate) {
-  // Newton's method goes on where a move costs little beside the step.
-  const bool goes_on = !still_ && rows_->traits.measures_rest;
-  return goes_on ? remove_rest(candidate, move_length_) : Status::success;
-}
-
 // Removes what a polish has changed in g, with factors of a point `reach` tolerances away.
 Status Mover::remove_rest(const Candidate& candidate, double reach) {
-  const bool cheap = rows_->traits.measures_rest, measure = curvature_.due(reach, ++settles_);
-  const double enough = (cheap ? kCheapRest : 1.0) * options_.advanced.tolerance;
+  const bool measure = curvature_.due(reach, ++settles_);
   double previous = 0.0;
   for (int k = 0; k < options_.advanced.maximum_iterations; ++k) {
     Status status = rows_->value(candidate.t, false);
@@ -249,13 +238,10 @@ Status Mover::remove_rest(const Candidate& candidate, double reach) {
     }
     if (found.status != Status::success) return found.status;
     if ((status = rows_->apply(1.0, candidate)) != Status::success) return status;
-    if ((still_ && age_ > 0) || !rows_->traits.gives_g)
-      break;  // the move is too short to show a rate
+    if ((still_ && age_ > 0) || !rows_->gives_g()) break;  // the move is too short to show a rate
     const double length = found.length;
-    // Cheap moves allow the rate to be measured on this candidate.
-    const double expected =
-        cheap ? length * (k > 0 ? length / previous : kLeft) : curvature_.left(reach, length);
-    const bool enough_done = (k > 0 || cheap || !measure) && expected <= enough;
+    const bool enough_done =
+        (k > 0 || !measure) && curvature_.left(reach, length) <= options_.advanced.tolerance;
     if (k == 0 && enough_done) break;
     const double floor = 1e2 * kEpsilon * rows_->size();
     const bool rounding = length <= floor || (k > 0 && length > 0.5 * previous);

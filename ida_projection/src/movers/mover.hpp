@@ -88,8 +88,6 @@ class Mover {
   /// After a successful move() the correction was changed by `change`: removes what this changes in
   /// g, with the current factors.
   Status settle(const Candidate& candidate, N_Vector change);
-  /// Completes the last move() if no settle() follows.
-  Status finish(const Candidate& candidate);
   /// Largest |g_i| at the present candidate; -1 if g cannot be evaluated.
   double remaining_drift(const Candidate& candidate);
   /// RowsAt::tangency(), unless C is that of an earlier candidate.

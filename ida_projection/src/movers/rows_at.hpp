@@ -41,20 +41,10 @@ enum class Solve {
 /// what the storage can do.
 class RowsAt {
  public:
-  /// Properties that do not change during the life of a storage.
-  struct Traits {
-    /// Whether there is a g. A projection of the caller's own has none and consists of one
-    /// solution.
-    bool gives_g = true;
-    /// Whether second moves are cheap beside the factors. Then each candidate is checked by one.
-    bool measures_rest = false;
-    /// Whether rows are so many that moves may be rough, or polished first.
-    bool many = false;
-  };
-  explicit RowsAt(const Traits& these) : traits(these) {}
   virtual ~RowsAt() = default;
 
-  const Traits traits;
+  /// Whether there is a g. A projection of the caller's own has none and consists of one solution.
+  virtual bool gives_g() const { return true; }
 
   /// Loads y = base + correction. `refills`: factor() in the metric of this candidate follows; else
   /// only its scale is updated.
@@ -86,8 +76,6 @@ class RowsAt {
   /// Whether the independent rows were determined for this candidate.
   virtual bool decided() const { return true; }
   virtual void forget_rank() {}
-  /// Whether the correction may be polished before the move.
-  virtual bool may_polish_first() const { return false; }
   /// Whether dropped rows contradict the kept ones; sets `message` and `contradicting`.
   virtual bool contradicts() = 0;
   /// Moves failed or were many: perhaps entries of C are missing that g could not fill before.

@@ -10,14 +10,14 @@ class UserRows final : public RowsAt {
  public:
   UserRows(const Constraints& constraints, const Options& options, Statistics& statistics,
            N_Vector like)
-      : RowsAt({false, false}),
-        user_(std::get<UserProjection>(constraints.jacobian)),
+      : user_(std::get<UserProjection>(constraints.jacobian)),
         options_(options),
         statistics_(statistics),
         y_(like),
         change_(like),
         error_(like) {}
 
+  bool gives_g() const override { return false; }
   Status load(const Candidate& candidate, bool) override {
     at_ = candidate;
     return Status::success;

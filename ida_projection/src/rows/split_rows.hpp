@@ -35,9 +35,6 @@ class PatternRefresh {
 /// not zero there. WT = 0: unweighted.
 std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT);
 
-/// Moves of more rows may be rough in the metric, and cost little beside the factors.
-constexpr int kMany = 16;
-
 /// C dy = g in minimum norm, in two stages: rows without algebraic variables ("A") move the
 /// differential columns ("d"); then rows that contain algebraic variables ("B") are solved for
 /// these columns ("a") alone, so that no position or velocity is bent to repair a multiplier.
@@ -51,8 +48,6 @@ class SplitRows {
   /// Pivots of dense rows tell which are independent and which need RowTrust. Rows that are known
   /// to be independent have factors that cost half or less.
   static constexpr bool kDense = std::is_same_v<Solver, linalg::MinimumNorm>;
-  /// With many rows a second Newton step is cheap beside the factors.
-  static bool many(int rows) { return kDense && rows > kMany; }
 
   SplitRows(const Constraints& constraints, const Evaluator& evaluator, int n);
 

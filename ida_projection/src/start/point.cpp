@@ -102,7 +102,7 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
 
     N_VScale(1.0, point.correction, from_);
     if ((report.status = rows_->apply(1.0, point)) != Status::success) return;
-    if (!rows_->traits.gives_g) {
+    if (!rows_->gives_g()) {
       ++report.iterations;
       return;
     }

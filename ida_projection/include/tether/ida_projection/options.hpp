@@ -59,8 +59,9 @@ struct Advanced {
   /// Estimated distance left to the constraints is at most this many tolerances; > 0.
   double tolerance = 1e-4;
 
-  /// Newton moves at most in one step; >= 1. Quadratic convergence takes three.
-  int maximum_iterations = 5;
+  /// Newton moves at most in one step; >= 1. Quadratic convergence takes three; eight reach
+  /// `tolerance` from one tolerance where each is a fourth of the one before.
+  int maximum_iterations = 8;
 
   /// Allowed length of a move: largest_move * max(1, length of the corrector's change), in
   /// tolerances; >= 0.1.

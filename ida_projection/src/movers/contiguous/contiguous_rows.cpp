@@ -149,7 +149,7 @@ Status ContiguousRows<Rows>::factor(double t, bool refill) {
 template <class Rows>
 bool ContiguousRows<Rows>::decide() {
   ++statistics_.factorizations;
-  if (count() > kMany) find_rates();
+  find_rates();
   if (!blocks_.factor()) return false;
   if (blocks_.dropped_rows()) ++statistics_.rank_drops;
   if constexpr (Rows::kDense)
@@ -212,9 +212,8 @@ Solution ContiguousRows<Rows>::solve(Solve how) {
       found.length = judge_thin_rows(length_of_solution());
     }
   }
-  // A polish of few rows is too short to show it.
-  const bool shows = how != Solve::rest || traits.measures_rest;
-  if (Rows::kDense && shows && !dropped_follow()) {
+  // A polish is too short to show it.
+  if (Rows::kDense && how != Solve::rest && !dropped_follow()) {
     uses_.lasting = false;
     if ((found.status = factor(t_, false)) != Status::success) return found;
     blocks_.solve(g_);

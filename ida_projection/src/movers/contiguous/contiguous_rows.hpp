@@ -18,6 +18,7 @@
 namespace tether::ida_projection {
 
 constexpr double kFollows = 0.25;  // of Options::tolerance: dropped rows may ask for such a move
+constexpr int kFew = 16;           // rows: their moves are not rough
 
 /// `Rows` keeps C and its factors: DenseRows or SparseRows.
 template <class Rows>
@@ -26,9 +27,7 @@ class ContiguousRows final : public RowsAt {
   /// Drift is that of the first `reported` rows (-1: of all).
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, int reported)
-      : RowsAt({true, Rows::many(constraints.total_count()),
-                constraints.total_count() > kMany || !Rows::kDense}),
-        evaluator_(constraints, statistics),
+      : evaluator_(constraints, statistics),
         blocks_(constraints, evaluator_, size),
         at_(size),
         metric_(options, size),
@@ -58,9 +57,6 @@ class ContiguousRows final : public RowsAt {
   }
   bool decided() const override { return uses_.decided; }
   void forget_rank() override { uses_.lasting = false; }
-  bool may_polish_first() const override {
-    return Rows::kDense ? traits.measures_rest : !blocks_.dropped_rows();
-  }
   bool contradicts() override;
   void refresh_pattern_soon() override { blocks_.refresh_pattern_soon(); }
 
@@ -78,7 +74,7 @@ class ContiguousRows final : public RowsAt {
   // Few rows make no rough moves. At singular positions, where rows are nearly dependent, F
   // responds to any move, stiff or not.
   bool may_use_levels() const override {
-    return count() > kMany && !uses_.thin && !blocks_.dropped_rows();
+    return count() > kFew && !uses_.thin && !blocks_.dropped_rows();
   }
 
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;

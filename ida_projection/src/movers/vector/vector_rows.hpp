@@ -25,8 +25,7 @@ class VectorRows final : public RowsAt {
  public:
   VectorRows(const Constraints& constraints, const Options& options, Statistics& statistics,
              N_Vector like)
-      : RowsAt({}),
-        statistics_(statistics),
+      : statistics_(statistics),
         y_(like),
         dy_(like),
         work_(like),
