@@ -233,9 +233,9 @@ TEST_CASE("surfaces: they stand still, in steps", "[scene]") {
   CHECK(told);
   try {
     ts::parse_scene(ball + mesh + "mass = 1\ninertia = [1, 1, 1]\n", "s");
-    FAIL("a mesh moves");
+    FAIL("an open mesh moves");
   } catch (const ts::SceneError& e) {
-    CHECK_THAT(e.what(), Contains("a mesh is a surface without an inside"));
+    CHECK_THAT(e.what(), Contains("the surface of a body that moves must be closed"));
   }
   ts::Scene events = scene;
   events.event.emplace();

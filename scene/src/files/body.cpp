@@ -1,5 +1,6 @@
 // Tether: bodies in a scene file. SPDX-License-Identifier: BSD-3-Clause
 
+#include <algorithm>
 #include <cmath>
 
 #include "effects/list.hpp"
@@ -58,7 +59,7 @@ Shape read_shape(Fields& in, Reader& r) {
   if (kind < 0) {
     for (const ShapeKind each : contact::kShapeKinds)
       for (const ShapeField& field : type_of(each).fields()) in.pass_over({field.key});
-    in.pass_over({"file", "heights", "spacing", "scale"});
+    in.pass_over({"file", "heights", "spacing", "scale", "concavity"});
     shape.radius = 1;
     return shape;
   }
@@ -71,23 +72,49 @@ Shape read_shape(Fields& in, Reader& r) {
   return shape;
 }
 
-std::vector<Shape> read_shapes(Fields& in, Reader& r) {
-  std::vector<Shape> shapes;
+// The shapes of a body as they are given, whose solid it is, and as they touch: a mesh that moves
+// as its convex parts.
+struct ReadShapes {
+  std::vector<Shape> given, touching;
+};
+
+void add_shape(Fields& in, Reader& r, bool fixed, bool has_place, ReadShapes& out) {
+  Shape shape = read_shape(in, r);
+  if (has_place) {
+    shape.position = in.vector("position", Vector3d::Zero(), kAny, "m");
+    shape.orientation = read_orientation(in, r);
+  }
+  if (shape.kind == ShapeKind::mesh && fixed && shape.concavity > 0)
+    in.wrong("concavity", "is for a body that moves: a fixed mesh is a surface and has no parts");
+  if (shape.kind != ShapeKind::mesh || fixed || !r.report.clean()) {
+    out.given.push_back(shape);
+    out.touching.push_back(std::move(shape));
+    return;
+  }
+  std::vector<Shape> parts = read_parts(in, r, shape);
+  for (Shape& part : parts) {
+    part.position = placed(shape, part.position);
+    part.orientation = shape.orientation;
+  }
+  const bool convex = parts.size() == 1 && shape.concavity == 0;
+  out.given.push_back(convex ? parts.front() : std::move(shape));
+  for (Shape& part : parts) out.touching.push_back(std::move(part));
+}
+
+ReadShapes read_shapes(Fields& in, Reader& r, bool fixed) {
+  ReadShapes out;
   const bool several = in.has("shapes");
   if (several && in.has("shape")) in.wrong("shape", "give shape or shapes, not both");
   if (!several) {
-    if (in.has("shape")) shapes.push_back(read_shape(in, r));
-    return shapes;
+    if (in.has("shape")) add_shape(in, r, fixed, false, out);
+    return out;
   }
   for (const Value* each : in.tables("shapes")) {
-    Fields fields = r.fields(each, fmt::format("{}: shape {}", in.path(), shapes.size() + 1));
-    Shape shape = read_shape(fields, r);
-    shape.position = fields.vector("position", Vector3d::Zero(), kAny, "m");
-    shape.orientation = read_orientation(fields, r);
+    Fields fields = r.fields(each, fmt::format("{}: shape {}", in.path(), out.given.size() + 1));
+    add_shape(fields, r, fixed, true, out);
     fields.finish();
-    shapes.push_back(std::move(shape));
   }
-  return shapes;
+  return out;
 }
 
 void read_mass(Fields& in, Body& body) {
@@ -119,7 +146,13 @@ void read_mass(Fields& in, Body& body) {
   if (!from_shapes) return;
 
   const char* const advice = by_density ? "density" : "inertia";
-  const MassProperties solid = mass_properties(body.shapes);
+  // A fixed mesh is a surface without an inside.
+  std::vector<Shape> solids = body.shapes;
+  if (body.fixed) {
+    const auto is_mesh = [](const Shape& s) { return s.kind == ShapeKind::mesh; };
+    solids.erase(std::remove_if(solids.begin(), solids.end(), is_mesh), solids.end());
+  }
+  const MassProperties solid = mass_properties(solids);
   if (!(solid.volume > 0) || !std::isfinite(solid.volume)) {
     const std::string why = body.shapes.empty() ? "there is no shape to take it from"
                                                 : "the shapes have no (finite) volume";
@@ -196,8 +229,10 @@ void body_fields(const Form& form, Body& body) {
   form.name("body", body.name);
   form.flag("fixed", body.fixed);
   if (in) {
-    body.shapes = read_shapes(*in, *form.reader());
+    ReadShapes shapes = read_shapes(*in, *form.reader(), body.fixed);
+    body.shapes = std::move(shapes.given);
     read_mass(*in, body);
+    body.shapes = std::move(shapes.touching);
   } else {
     write_shapes(body, *form.out());
     write_mass(body, *form.out());

@@ -32,7 +32,7 @@ void check_bodies(const Scene& scene, Report& report) {
     const bool mesh = any_of(body.shapes, [](const Shape& s) { return s.kind == ShapeKind::mesh; });
     if (mesh && !body.fixed)
       report.add(body.place, called(body) + ": fixed", "",
-                 "must be true: a mesh is a surface without an inside, for what stands still");
+                 "must be true: on a body that moves a mesh is given as its convex_parts()");
     if (body.fixed && (!body.velocity.isZero(0) || !body.angular_velocity.isZero(0)))
       report.add(body.place, called(body) + ": velocity", "", "must be zero: the body is fixed");
     for (const effects::Effect* each : effects::all()) each->check_body(body, report);

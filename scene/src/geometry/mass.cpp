@@ -17,7 +17,51 @@ Matrix3d point_inertia(const Vector3d& d) {
   return d.squaredNorm() * Matrix3d::Identity() - d * d.transpose();
 }
 
+// Sums over tetrahedra with one corner at the origin: volume, first and second moments.
+struct Moments {
+  double volume = 0;
+  Vector3d first = Vector3d::Zero();
+  Matrix3d second = Matrix3d::Zero();
+
+  void add(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    const double v = a.dot(b.cross(c)) / 6;
+    const Vector3d s = a + b + c;
+    volume += v;
+    first += v / 4 * s;
+    second +=
+        v / 20 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + s * s.transpose());
+  }
+};
+
 }  // namespace
+
+MassProperties within(const std::vector<Vector3d>& points,
+                      const std::vector<std::vector<std::size_t>>& faces) {
+  Vector3d origin = Vector3d::Zero();
+  for (const Vector3d& p : points) origin += p / static_cast<double>(points.size());
+  std::vector<Vector3d> p;
+  double size = 0;
+  for (const Vector3d& each : points) {
+    p.emplace_back(each - origin);
+    size = std::max(size, p.back().norm());
+  }
+  if (!(size > 0) || !std::isfinite(size)) return {};
+  for (Vector3d& each : p) each /= size;  // nothing below overflows
+
+  Moments sum;
+  for (const std::vector<std::size_t>& face : faces)
+    for (std::size_t m = 1; m + 1 < face.size(); ++m)
+      sum.add(p[face[0]], p[face[m]], p[face[m + 1]]);
+  if (!(sum.volume > 1e-12)) return {};
+  MassProperties out;
+  const double cube = size * size * size;
+  const Vector3d centre = sum.first / sum.volume;
+  const Matrix3d second = sum.second - sum.volume * centre * centre.transpose();
+  out.volume = sum.volume * cube;
+  out.centre = origin + centre * size;
+  out.inertia = (second.trace() * Matrix3d::Identity() - second) * (cube * size * size);
+  return out;
+}
 
 MassProperties along_axes(double volume, const Vector3d& lengths, double part) {
   const Vector3d s = lengths.cwiseProduct(lengths) / part;

@@ -25,8 +25,6 @@ static_assert(0
 
 namespace {
 
-constexpr std::size_t kMostPoints = 4096;
-
 /// A face between corners that are counter-clockwise from outside.
 Face face_between(const std::vector<Vector3d>& corners) {
   Face face;
@@ -123,6 +121,84 @@ void add_corners(const Shape& shape, const std::vector<Vector3d>& local, bool so
     out.knobs.push_back({points.back(), 0, {}});
   }
   if (solid) add_polyhedron(points, out);
+}
+
+namespace {
+
+// Points nearer than this part of the extent of a body are one, as for the seams of contact.
+constexpr double kSamePoint = 1e-6;
+
+// Adds the part of an edge of face `a` along which face b goes down from it.
+void add_shared_edge(const contact::OpenFace& a, std::size_t i, const contact::OpenFace& b,
+                     double same, Outline& out) {
+  const Vector3d& from = a.corners[i];
+  const Vector3d way = a.corners[(i + 1) % a.corners.size()] - from;
+  Segment edge;
+  edge.along = way.normalized();
+  for (std::size_t k = 0; k < b.corners.size(); ++k) {
+    const Vector3d p = b.corners[(k + 1) % b.corners.size()] - from, q = b.corners[k] - from;
+    const double start = std::max(0.0, edge.along.dot(p));
+    const double end = std::min(way.norm(), edge.along.dot(q));
+    if (end - start <= same || p.cross(edge.along).norm() > same ||
+        q.cross(edge.along).norm() > same)
+      continue;
+    edge.inward = {a.normal.cross(edge.along), edge.along.cross(b.normal)};
+    if (!(a.normal.dot(edge.inward[1]) < -kSamePoint)) continue;  // flat or hollow
+    edge.at = from + start * edge.along;
+    edge.length = end - start;
+    out.segments.push_back(edge);
+  }
+}
+
+// The ends of edges, but for those between two edges of one line.
+void add_knobs(double same, Outline& out) {
+  const auto end_at = [&](const Vector3d& at, const Vector3d& way) {
+    const auto known = std::find_if(out.knobs.begin(), out.knobs.end(),
+                                    [&](const Knob& k) { return (k.at - at).norm() <= same; });
+    if (known == out.knobs.end())
+      out.knobs.push_back({at, 0, {way}});
+    else
+      known->edges.push_back(way);
+  };
+  for (const Segment& s : out.segments) {
+    const Vector3d way = s.length * s.along;
+    end_at(s.at, way);
+    end_at(s.at + way, -way);
+  }
+  const auto is_straight = [](const Knob& k) {
+    return std::all_of(k.edges.begin(), k.edges.end(), [&](const Vector3d& way) {
+      return way.normalized().cross(k.edges[0].normalized()).norm() <= kSamePoint;
+    });
+  };
+  out.knobs.erase(std::remove_if(out.knobs.begin(), out.knobs.end(), is_straight), out.knobs.end());
+}
+
+}  // namespace
+
+void join_outlines(const std::vector<std::vector<contact::OpenFace>>& faces,
+                   std::vector<Outline>& outlines) {
+  std::vector<const contact::OpenFace*> all;
+  Outline joined;
+  Outline* first = nullptr;
+  double size = 0;
+  for (std::size_t k = 0; k < faces.size(); ++k) {
+    if (faces[k].empty()) continue;
+    if (first == nullptr) first = &outlines[k];
+    size = std::max(size, outlines[k].reach());
+    outlines[k] = Outline();
+    for (const contact::OpenFace& each : faces[k]) {
+      all.push_back(&each);
+      joined.faces.push_back(face_between(each.corners));
+    }
+  }
+  if (first == nullptr) return;
+  const double same = kSamePoint * size;
+  for (std::size_t a = 0; a < all.size(); ++a)
+    for (std::size_t b = a + 1; b < all.size(); ++b)
+      for (std::size_t i = 0; i < all[a]->corners.size(); ++i)
+        add_shared_edge(*all[a], i, *all[b], same, joined);
+  add_knobs(same, joined);
+  *first = std::move(joined);
 }
 
 using Eigen::Vector3d;

@@ -74,6 +74,11 @@ void add_axis(const Shape& shape, Outline& out);
 void add_corners(const Shape& shape, const std::vector<Eigen::Vector3d>& local, bool solid,
                  Outline& out);
 
+/// Replaces the outlines of the shapes that have open faces by one, that of the surface which these
+/// make up: without the seams between them.
+void join_outlines(const std::vector<std::vector<contact::OpenFace>>& faces,
+                   std::vector<Outline>& outlines);
+
 /// In the axes of the body. Faces are convex, counter-clockwise from outside; single points where
 /// a shape has no faces.
 struct Mesh {
@@ -97,7 +102,7 @@ struct MassProperties {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
 };
 
-/// A plane, points and a mesh have none.
+/// A plane and points have none; of a mesh the solid within its surface, which has to be closed.
 MassProperties mass_properties(const Shape& shape);
 /// Properties of shapes that do not overlap, in the axes of their body.
 MassProperties mass_properties(const std::vector<Shape>& shapes);
@@ -105,6 +110,8 @@ MassProperties mass_properties(const std::vector<Shape>& shapes);
 /// Whether the principal moments are > 0 and each at most the sum of the others, but for rounding;
 /// inside: by so much that rounding on the way to a scene does no harm.
 bool is_inertia(const Eigen::Matrix3d& inertia, bool inside = false);
+
+constexpr std::size_t kMostPoints = 4096;  // of a convex shape
 
 /// A part of a shape as scene files have it.
 struct ShapeField {
@@ -150,6 +157,9 @@ TETHER_EXPORT_END
 Mesh capsule_mesh(double radius, double length, int around);
 /// A solid in which the mean square of a coordinate is a part of that length squared: 1 / part.
 MassProperties along_axes(double volume, const Eigen::Vector3d& lengths, double part);
+/// The solid within a closed surface of faces that are counterclockwise seen from outside.
+MassProperties within(const std::vector<Eigen::Vector3d>& points,
+                      const std::vector<std::vector<std::size_t>>& faces);
 /// Faces of the hull of points, or these one by one.
 Mesh points_mesh(const std::vector<Eigen::Vector3d>& points);
 

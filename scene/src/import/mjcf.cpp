@@ -9,6 +9,7 @@
 #include <tether/linalg/symmetric_eigen.hpp>
 
 #include "geometry/shape_type.hpp"
+#include "mesh.hpp"
 #include "robot.hpp"
 #include "xml.hpp"
 
@@ -27,7 +28,9 @@ struct Settings {
   // <default>
   std::set<std::string> outermost{"main"};  ///< names of the class of elements without one, ""
   std::map<std::string, std::map<std::string, Attributes>, std::less<>> classes;  ///< by element
-  std::size_t copied = 0;  ///< attributes that classes have from those around them
+  std::string mesh_folder;              ///< in that of the robot's file, with its /
+  std::map<std::string, Shape> meshes;  ///< of <asset>, by name; without points: it has no file
+  std::size_t copied = 0;               ///< attributes that classes have from those around them
 
   double angle(double x) const { return degrees ? x * (linalg::kPi / 180) : x; }
   /// Attributes of `element` in a class ("": the outermost). Reports a class that is not there.
@@ -70,6 +73,8 @@ void read_compiler(const Node& node, Settings& out, Problems& problems, Remarks&
   for (const char* key : {"boundmass", "boundinertia"})
     if (tag.number(key, 0) > 0) remarks.add(fmt::format("compiler {}", key));
   out.balance_inertia = tag.flag("balanceinertia", out.balance_inertia);
+  const std::string folder = tag.text("meshdir", tag.text("assetdir"));
+  if (!folder.empty()) out.mesh_folder = folder + "/";
   tag.finish(remarks, {"meshdir", "texturedir", "assetdir", "convexhull", "discardvisual",
                        "usethread", "strippath", "alignfree", "fusestatic"});
 }
@@ -152,11 +157,31 @@ struct Solid {
   double volume = 0;
   Matrix3d inertia = Matrix3d::Zero();
   std::optional<Shape> shape;
+  Vector3d centre = Vector3d::Zero();
 };
 
 Solid of_shape(const Shape& shape) {
   const MassProperties properties = mass_properties(shape);
-  return {properties.volume, properties.inertia, shape};
+  return {properties.volume, properties.inertia, shape, properties.centre};
+}
+
+/// As in MuJoCo a mesh touches as its hull, and weighs as what is within its surface.
+Solid read_mesh_solid(const Settings& settings, const std::string& name, const std::string& geom,
+                      bool touches, Remarks& remarks) {
+  const auto found = settings.meshes.find(name);
+  if (found == settings.meshes.end() || found->second.points.empty()) return {};
+  const Shape& mesh = found->second;
+  if (!touches) {  // hulls of what only shows would take the longest
+    Solid out = of_shape(mesh);
+    out.shape.reset();
+    return out;
+  }
+  const std::optional<Shape> hull = hull_of(mesh, geom, remarks);
+  if (!hull) return {};
+  remarks.add("meshes touch as their convex hulls", geom);
+  Solid out = of_shape(mesh.triangles.empty() ? *hull : mesh);
+  out.shape = hull;
+  return out;
 }
 
 /// The numbers of `size` from `from` on, which must be there and > 0.
@@ -252,7 +277,36 @@ const Attributes* Settings::defaults(const Node& node, const std::string& name,
   return of == found->second.end() ? nullptr : &of->second;
 }
 
-/// Reads <compiler>, <option> and <default> below the root; gravity and step go to the model.
+/// A mesh by its file or its vertices, without triangles then.
+void read_mesh_asset(const Node& node, Settings& out, Problems& problems, Remarks& remarks) {
+  Tag own(node, problems);
+  Tag tag(node, problems, out.defaults(node, own.text("class"), problems));
+  const std::string file = tag.text("file");
+  std::string stem = file.substr(std::min(file.find_last_of('/') + 1, file.size()));
+  stem = stem.substr(0, stem.find_last_of('.'));
+  const std::string name = tag.text("name", stem);
+  const Vector3d scale = tag.vector("scale", Vector3d::Ones());
+  const Vector3d at = tag.vector("refpos", Vector3d::Zero());
+  const std::vector<double> q = tag.numbers("refquat", 4, 4);
+  const std::vector<double> vertices = tag.numbers("vertex", 12, 3 * kMostPoints);
+  tag.finish(remarks, {"class", "normal", "texcoord", "face", "smoothnormal", "maxhullvert",
+                       "inertia", "content_type"});
+  Shape mesh = Shape::mesh({}, {});
+  if (!file.empty()) {
+    mesh = read_mesh(problems.file(), out.mesh_folder + file, scale, name, remarks).value_or(mesh);
+  } else {
+    for (std::size_t k = 0; k + 2 < vertices.size(); k += 3)
+      mesh.points.push_back(
+          Vector3d(vertices[k], vertices[k + 1], vertices[k + 2]).cwiseProduct(scale));
+  }
+  Quaterniond turn = Quaterniond::Identity();
+  if (!q.empty()) turn.coeffs() = Eigen::Vector4d(q[1], q[2], q[3], q[0]).stableNormalized();
+  for (Vector3d& p : mesh.points) p = turn.conjugate() * (p - at);
+  out.meshes[name] = std::move(mesh);
+}
+
+/// Reads <compiler>, <option>, <default> and the meshes of <asset> below the root; gravity and step
+/// go to the model.
 Settings read_settings(const Node& root, Model& model, Problems& problems) {
   Settings out;
   model.gravity = Vector3d(0, 0, -9.81);
@@ -262,6 +316,11 @@ Settings read_settings(const Node& root, Model& model, Problems& problems) {
     if (is(*each, "option")) read_option(*each, model, problems);
     if (is(*each, "default")) read_class(*each, nullptr, out, problems, model.remarks);
   }
+  for (const Node* each = root.FirstChildElement("asset"); each != nullptr;
+       each = each->NextSiblingElement("asset"))
+    for (const Node* mesh = each->FirstChildElement("mesh"); mesh != nullptr;
+         mesh = mesh->NextSiblingElement("mesh"))
+      read_mesh_asset(*mesh, out, problems, model.remarks);
   return out;
 }
 
@@ -327,8 +386,11 @@ Geom read_geom(const Node& node, const std::string& class_name, const Settings& 
   if (type == "plane") {
     solid.shape.emplace().kind = ShapeKind::plane;
   } else if (type == "mesh" || type == "hfield" || type == "sdf") {
-    remarks.add(fmt::format("geoms of type {}", type), name_or_line(node));
-    if (!tag.has("mass") || tag.number("mass", 0) > 0) out.mass = -1;  // nobody knows
+    if (type == "mesh")
+      solid = read_mesh_solid(settings, tag.text("mesh"), name_or_line(node), out.touches, remarks);
+    if (!solid.shape) remarks.add(fmt::format("geoms of type {}", type), name_or_line(node));
+    const bool weighs = !tag.has("mass") || tag.number("mass", 0) > 0;
+    if (!(solid.volume > 0) && weighs) out.mass = -1;  // nobody knows
   } else if (type != "sphere" && type != "capsule" && type != "box" && type != "cylinder" &&
              type != "ellipsoid") {
     tag.wrong("type", "must be plane, sphere, capsule, cylinder, box, ellipsoid, mesh or hfield");
@@ -340,7 +402,7 @@ Geom read_geom(const Node& node, const std::string& class_name, const Settings& 
     const Matrix3d R = place.linear(), turned = R * solid.inertia * R.transpose();
     out.mass = mass;
     out.inertia = mass / solid.volume / 2 * (turned + turned.transpose());
-    out.centre = place.translation();
+    out.centre = place * solid.centre;
   }
   if (solid.shape) {
     out.shape = std::move(solid.shape);

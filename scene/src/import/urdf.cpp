@@ -6,6 +6,7 @@
 
 #include <cstring>
 
+#include "mesh.hpp"
 #include "robot.hpp"
 #include "xml.hpp"
 
@@ -161,6 +162,17 @@ std::optional<Shape> read_geometry(const Node& node, Problems& problems, Remarks
   return {};
 }
 
+std::vector<Shape> read_mesh_parts(const Node& node, const std::string& link, Problems& problems,
+                                   Remarks& remarks) {
+  Tag tag(node, problems);
+  const std::string name = tag.name("filename", "a file of a mesh");
+  const Vector3d scale = tag.vector("scale", Vector3d::Ones());
+  if (scale.cwiseAbs().minCoeff() == 0) tag.wrong("scale", "must be three numbers that are not 0");
+  tag.finish(remarks);
+  const std::optional<Shape> mesh = read_mesh(problems.file(), name, scale, link, remarks);
+  return mesh ? parts_of(*mesh, link, remarks) : std::vector<Shape>();
+}
+
 void read_collision(const Node& node, Link& link, Problems& problems, Remarks& remarks) {
   const Isometry3d origin = read_origin(node, problems, remarks);
   const Node* const geometry = only_child(node, "geometry", problems);
@@ -168,17 +180,23 @@ void read_collision(const Node& node, Link& link, Problems& problems, Remarks& r
   if (kind == nullptr)
     return problems.add(node.GetLineNum(), path(node) + ": geometry", "",
                         "is missing: a box, cylinder, sphere, capsule or mesh");
-  std::optional<Shape> shape = read_geometry(*kind, problems, remarks);
-  if (!shape) {
+  std::vector<Shape> shapes;
+  if (is(*kind, "mesh")) {
+    shapes = read_mesh_parts(*kind, link.name, problems, remarks);
+  } else if (std::optional<Shape> shape = read_geometry(*kind, problems, remarks)) {
+    shapes.push_back(std::move(*shape));
+  } else {
     const bool known =
         is(*kind, "box") || is(*kind, "sphere") || is(*kind, "cylinder") || is(*kind, "capsule");
     return remarks.add(
         fmt::format("collision geometry <{}>{}", kind->Name(), known ? " without size" : ""),
         link.name);
   }
-  shape->position = origin.translation();
-  if (origin.linear() != Matrix3d::Identity()) shape->orientation = origin.linear();
-  link.shapes.push_back(std::move(*shape));
+  for (Shape& shape : shapes) {
+    shape.position = origin * shape.position;
+    if (origin.linear() != Matrix3d::Identity()) shape.orientation = origin.linear();
+    link.shapes.push_back(std::move(shape));
+  }
   name_children(node, {"origin", "geometry"}, remarks);
   name_children(*geometry, {kind->Name()}, remarks);
 }

@@ -22,6 +22,7 @@ constexpr std::size_t kMostAttributes = 100;
 class Problems : public files::Report {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
+  const std::string& file() const { return file_; }
   void add(int line, std::string field, std::string value, std::string allowed) {
     Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
                 std::move(allowed));

@@ -116,6 +116,8 @@ struct Reader {
   std::set<std::string> surface_files;
   std::size_t surface_bytes = 0;      ///< read from them so far
   std::size_t surface_triangles = 0;  ///< of all bodies so far
+  contact::Shape last_mesh = {};      ///< of a body that moves, with its convex parts: bodies that
+  std::vector<contact::Shape> last_parts = {};  ///< are repeated are split once
 
   Fields fields(const Value* table, std::string path) const {
     return {table, std::move(path), file, report};

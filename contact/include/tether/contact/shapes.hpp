@@ -42,6 +42,7 @@ struct Shape {
   std::vector<Eigen::Vector3d> points;  ///< convex, mesh: vertices; points: touching points
   /// mesh: indices of its points, counterclockwise seen from outside, where the bodies are.
   std::vector<std::array<int, 3>> triangles;
+  double concavity = 0;  ///< mesh: depth of hollows that convex_parts() may fill, m
   Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of its origin, m
   linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< unit; shape to body
 
@@ -70,6 +71,22 @@ struct Shape {
   /// Points that touch other shapes, but neither meshes nor each other.
   static Shape touching_points(std::vector<Eigen::Vector3d> points);
 };
+
+/// The solid within a closed mesh, whose triangles run counterclockwise seen from outside, as
+/// convex shapes that do not overlap: what a body that moves has in place of a mesh. Exact, or with
+/// hollows up to `concavity` deep filled. A convex mesh is one shape with the same points. Throws
+/// std::invalid_argument naming the triangle or edge that bounds no solid, and where more than 1000
+/// parts are needed.
+std::vector<Shape> convex_parts(const Shape& mesh);
+
+/// A convex piece of the surface of a body, in its axes.
+struct OpenFace {
+  Eigen::Vector3d normal;                ///< unit, outwards
+  std::vector<Eigen::Vector3d> corners;  ///< counterclockwise seen from outside, m
+};
+/// For each of the shapes of a body: if it is a box or hull with another one against its faces,
+/// what these leave of them; else nothing. Throws std::invalid_argument if a hull is flat.
+std::vector<std::vector<OpenFace>> open_faces(const std::vector<Shape>& shapes);
 
 /// World position and orientation of a shape.
 struct Pose {

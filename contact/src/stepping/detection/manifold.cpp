@@ -31,7 +31,7 @@ void clip_to_face(const Flat& face, const Vector3d& n, Flat& subject) {
         [&](std::size_t j) -> const Vector3d& { return subject.point[j]; },
         [&](std::size_t j) { kept.add(subject.point[j], subject.id[j]); },
         [&](std::size_t j, std::size_t, const Vector3d& x, bool) {
-          kept.add(x, 0x800 + (subject.id[j] * 61 + face.id[at(k)]) % 0x7000);
+          kept.add(x, kCut + (subject.id[j] * 61 + face.id[at(k)]) % 0x7000);
         });
     kept.normal = subject.normal;
     subject = kept;

@@ -12,6 +12,9 @@ namespace tether::contact::detail {
 // Parts of a surface up to this height, relative to the thickness, may touch.
 constexpr double kHigh = 0.1;
 
+// Features of the points where the border of a face cuts another shape's.
+constexpr int kCut = 0x800, kNoCut = 0x7f00;
+
 /// Two shapes relative to a common origin, their separation, and the list that contacts go to.
 struct ConvexPair {
   const ConvexShape &a, &b;

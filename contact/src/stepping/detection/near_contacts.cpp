@@ -9,6 +9,9 @@
 
 #include "problem/refuse.hpp"
 #include "stepping/detection/collide.hpp"
+#include "stepping/detection/polyhedra/round_contacts.hpp"
+#include "stepping/detection/polyhedra/seams.hpp"
+#include "stepping/detection/shape_parts.hpp"
 
 namespace tether::contact::detail {
 
@@ -17,6 +20,8 @@ using Eigen::Vector3d;
 namespace {
 
 using linalg::at;
+
+constexpr double kCurvedNormal = 1e-6;  // radian: what the search for normals may leave
 
 bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
 
@@ -70,13 +75,15 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     const bool plane = s.shape.kind == ShapeKind::plane;
     const bool mesh = s.shape.kind == ShapeKind::mesh;
     if ((plane || mesh) && moves(bodies, s.body))
-      throw std::invalid_argument(where + "a " + name(s.shape.kind) + " belongs to a fixed body");
+      throw std::invalid_argument(where + "a " + name(s.shape.kind) + " belongs to a fixed body" +
+                                  (mesh ? "; one that moves has its convex_parts()" : ""));
     mesh_.push_back(mesh ? static_cast<int>(meshes_.size()) : -1);
     if (mesh) meshes_.emplace_back(s.shape);
     index_.push_back(plane ? ~static_cast<int>(planes_.size()) : static_cast<int>(bounded_.size()));
     (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
   }
   find_polyhedra(bodies);
+  join_parts();
 
   pose_.resize(surfaces_.size());
   for (const Surface& s : surfaces_) {
@@ -135,6 +142,43 @@ void NearContacts::find_polyhedra(const BodySet& bodies) {
     for (const Kind& each : list)
       if (each.polyhedra && is_polyhedron(each.kind))
         for (const int k : each.surfaces) polyhedron_[at(k)] = make_polyhedron(surface(k).shape);
+}
+
+// Boxes and hulls of one body and material that lie against each other are parts of one solid.
+void NearContacts::join_parts() {
+  std::map<std::pair<int, int>, std::vector<int>> solids;  // by body and material
+  for (int k = 0; k < static_cast<int>(surfaces_.size()); ++k)
+    if (is_polyhedron(surface(k).shape.kind))
+      solids[{surface(k).body, surface(k).material}].push_back(k);
+  for (const auto& [body, numbers] : solids) {
+    if (numbers.size() < 2) continue;
+    std::vector<Polyhedron> parts;
+    std::vector<Pose> poses;
+    for (const int k : numbers) {
+      const Shape& s = surface(k).shape;
+      parts.push_back(make_polyhedron(s));
+      poses.push_back({s.position, s.orientation.toRotationMatrix()});
+    }
+    const std::vector<std::vector<int>> touching = find_seams(parts, poses);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (touching[i].empty()) continue;
+      touching_.resize(surfaces_.size());
+      for (const int j : touching[i]) touching_[at(numbers[i])].push_back(numbers[at(j)]);
+      polyhedron_[at(numbers[i])] = std::move(parts[i]);
+    }
+  }
+}
+
+// Whether no contact has the point x and the outward normal n: within the body, or on a surface
+// that goes on above the plane across n.
+bool NearContacts::is_seam(int k, const Vector3d& near, const Vector3d& n, double angle) const {
+  const std::vector<int>& others = touching_[at(k)];
+  if (others.empty()) return false;
+  // The point is beside an edge that a round shape overlaps.
+  const Vector3d x = into(polyhedron_[at(k)], pose_[at(k)], near);
+  return std::any_of(others.begin(), others.end(),
+                     [&](int j) { return rises_above(polyhedron_[at(j)], pose_[at(j)], x, n); }) &&
+         !is_on_open_piece(polyhedron_[at(k)], pose_[at(k)], x, n, angle);
 }
 
 const Meeting* NearContacts::meeting_of(int a, int b) const {
@@ -198,9 +242,57 @@ void NearContacts::find_points(int i, int j, double margin) {
     meshes_[at(mesh_[at(i)])].collide(t, T, S, margin, near_);
     return turn(near_, 0);
   }
-  if (meet_as_polyhedra(s.kind, t.kind))
-    return polyhedra_.collide(s, polyhedron_[at(i)], S, t, polyhedron_[at(j)], T, margin, near_);
-  collide(s, S, t, T, margin, near_);
+  const bool i_has = has_seams(i), j_has = has_seams(j);
+  const bool points = s.kind == ShapeKind::points || t.kind == ShapeKind::points;
+  if (!meet_as_polyhedra(s.kind, t.kind) && !(points && (i_has || j_has)))
+    return collide(s, S, t, T, margin, near_);
+  const auto of_i = [&](const Vector3d& x, const Vector3d& n) {
+    return is_seam(i, S.position + x, n, kTie);
+  };
+  const auto of_j = [&](const Vector3d& x, const Vector3d& n) {
+    return is_seam(j, S.position + x, n, kTie);
+  };
+  SeamTest test_i, test_j;  // references: nothing is allocated
+  if (i_has) test_i = std::cref(of_i);
+  if (j_has) test_j = std::cref(of_j);
+  polyhedra_.collide(s, polyhedron_[at(i)], S, t, polyhedron_[at(j)], T, margin, near_,
+                     i_has ? &test_i : nullptr, j_has ? &test_j : nullptr);
+}
+
+// Serves round shapes on polyhedra, and polyhedra on meshes. A normal belongs to one point where
+// the shape is a ball, and to all that lie flat otherwise; then the deepest point decides. Points
+// at which the shape passes the edge of a part are none where the surface goes on in the plane.
+void NearContacts::drop_seams(int i, int j) {
+  const ShapeKind a = surface(i).shape.kind, b = surface(j).shape.kind;
+  if ((!has_seams(i) && !has_seams(j)) || (is_polyhedron(a) && is_polyhedron(b))) return;
+  const auto is_curved = [](ShapeKind k) { return form(k).family() == ShapeForm::Family::curved; };
+  const bool on_mesh = a == ShapeKind::mesh || b == ShapeKind::mesh;
+  const bool curved = !on_mesh && (is_curved(a) || is_curved(b));
+  const double angle = on_mesh ? kTie : curved ? kCurvedNormal : kUpright;
+  const auto seam = [&](const NearPoint& p) {
+    return is_seam(i, p.on_first, -p.normal, angle) || is_seam(j, p.on_second, p.normal, angle);
+  };
+  const auto first = near_.point.begin();
+  auto end = first + near_.count;
+  if (near_.count > 0 && curved) {
+    const auto deepest = std::min_element(
+        first, end, [](const NearPoint& p, const NearPoint& q) { return p.gap < q.gap; });
+    if (seam(*deepest)) end = first;
+  } else {
+    end = std::remove_if(first, end, seam);
+  }
+  const bool capsule = a == ShapeKind::capsule || b == ShapeKind::capsule;
+  end = std::remove_if(first, end, [&](const NearPoint& p) {
+    return (capsule ? p.feature >= kCapsuleOnEdge : p.feature >= kCut && p.feature < kNoCut) &&
+           (goes_on(i, p.on_first, -p.normal) || goes_on(j, p.on_second, p.normal));
+  });
+  near_.count = static_cast<int>(end - first);
+}
+
+bool NearContacts::goes_on(int k, const Vector3d& x, const Vector3d& n) const {
+  return has_seams(k) && std::any_of(touching_[at(k)].begin(), touching_[at(k)].end(), [&](int j) {
+           return is_on_open_piece(polyhedron_[at(j)], pose_[at(j)], x, n, kTie);
+         });
 }
 
 void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {
@@ -214,6 +306,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   double margin = ball_[at(a)] - reach_[at(a)];
   if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
   find_points(i, j, margin);
+  if (!touching_.empty() && b >= 0) drop_seams(i, j);
   // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
   // would change their common angular momentum.
   const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;

@@ -50,6 +50,14 @@ class NearContacts {
 
  private:
   void find_polyhedra(const BodySet& bodies);
+  void join_parts();
+  bool is_seam(int surface, const Eigen::Vector3d& x, const Eigen::Vector3d& n, double angle) const;
+  bool has_seams(int surface) const {
+    return !touching_.empty() && !touching_[static_cast<std::size_t>(surface)].empty();
+  }
+  void drop_seams(int first, int second);  // in near_
+  // Whether a part beside surface k has x on an open face with the normal n.
+  bool goes_on(int k, const Eigen::Vector3d& x, const Eigen::Vector3d& n) const;
   const Meeting* meeting_of(int a, int b) const;  // of surfaces; null: they pass through
   void place(const BodySet& bodies, double dt);
   void set_pose(const BodySet& bodies, int surface);
@@ -65,6 +73,8 @@ class NearContacts {
   double near_part_;
   PolyhedraContacts polyhedra_;
   std::vector<Polyhedron> polyhedron_;  // of each surface; empty where none is needed
+  // For each surface, other parts of its body that lie against it; empty where none does.
+  std::vector<std::vector<int>> touching_;
   std::vector<MeshContacts> meshes_;
   std::vector<int> mesh_;  // of each surface: its index in meshes_, or -1
   Broadphase broadphase_;

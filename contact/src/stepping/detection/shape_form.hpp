@@ -40,7 +40,7 @@ class ShapeForm {
   /// Adds its contacts with the plane through `on_plane` with the normal n.
   virtual void on_plane(const Shape&, const Pose&, const Eigen::Vector3d& /*on_plane*/,
                         const Eigen::Vector3d& /*n*/, double /*margin*/, NearPoints&) const {}
-  /// Nearest point of the surface, exact outside and inside (detection, section 5).
+  /// Nearest point of the surface, exact outside and inside (detection, section 6).
   virtual Nearest nearest(const Shape&, const Eigen::Vector3d&) const { return {}; }
   virtual bool has_nearest() const { return false; }
   virtual void make_polyhedron(const Shape&, Polyhedron&) const {}

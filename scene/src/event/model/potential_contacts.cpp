@@ -103,9 +103,8 @@ Outline outline_of(const Shape& shape) {
   return out;
 }
 
-void add(const Shape& a, const Shape& b, const FeaturePair& of_bodies,
-         std::vector<FeaturePair>& out) {
-  const Outline of_a = outline_of(a), of_b = outline_of(b);
+void add(const Shape& a, const Outline& of_a, const Shape& b, const Outline& of_b,
+         const FeaturePair& of_bodies, std::vector<FeaturePair>& out) {
   const bool points = a.kind == ShapeKind::points && b.kind == ShapeKind::points;
   const bool on_plane = b.kind == ShapeKind::plane;
   if (points || (a.kind == ShapeKind::plane && on_plane)) return;  // never touch
@@ -120,6 +119,14 @@ void add(const Shape& a, const Shape& b, const FeaturePair& of_bodies,
   contacts.put_rounds(of_a, of_b);
   swapped.put_rounds(of_b, of_a);
   contacts.put_rounds_on_each_other(of_a, of_b);
+}
+
+// One outline a shape; that of parts which lie against each other is that of the first.
+std::vector<Outline> outlines_of(const Body& body) {
+  std::vector<Outline> out;
+  for (const Shape& shape : body.shapes) out.push_back(outline_of(shape));
+  if (out.size() > 1) join_outlines(contact::open_faces(body.shapes), out);
+  return out;
 }
 
 std::set<std::pair<int, int>> jointed(const Scene& scene) {
@@ -148,14 +155,20 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
   const std::set<std::pair<int, int>> apart = jointed(scene);
   std::vector<FeaturePair> out;
   const int count = static_cast<int>(scene.bodies.size());
+  std::vector<std::vector<Outline>> outlines(scene.bodies.size());
+  const auto shapes_of = [&](int b) -> const std::vector<Outline>& {
+    if (outlines[at(b)].empty()) outlines[at(b)] = outlines_of(scene.bodies[at(b)]);
+    return outlines[at(b)];
+  };
   for (int i = 0; i < count; ++i)
     for (int j = i + 1; j < count; ++j) {
       const Body &a = scene.bodies[at(i)], &b = scene.bodies[at(j)];
       if ((a.fixed && b.fixed) || apart.count({i, j}) > 0) continue;
       const auto found = meet.find(std::minmax(a.material, b.material));
       if (found == meet.end()) continue;
-      for (const Shape& s : a.shapes)
-        for (const Shape& o : b.shapes) {
+      const std::vector<Outline>&of_a = shapes_of(i), &of_b = shapes_of(j);
+      for (std::size_t s = 0; s < a.shapes.size(); ++s)
+        for (std::size_t o = 0; o < b.shapes.size(); ++o) {
           FeaturePair pair;
           pair.friction = found->second->friction;
           pair.restitution = found->second->restitution;
@@ -163,7 +176,7 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
           pair.torsional = found->second->torsional;
           pair.first = i;
           pair.second = j;
-          add(s, o, pair, out);
+          add(a.shapes[s], of_a[s], b.shapes[o], of_b[o], pair, out);
         }
       if (out.size() > kMostContacts)
         throw std::invalid_argument(fmt::format(

@@ -14,6 +14,9 @@ class MeshType final : public ShapeType {
   void read(files::Fields& in, files::Reader& r, Shape& shape) const override {
     files::read_mesh(in, r, shape);
   }
+  MassProperties solid(const Shape& s) const override {
+    return within(s.points, polygons(s, 0, 0).faces);
+  }
   Mesh polygons(const Shape& s, int, double) const override {
     Mesh m{s.points, {}, {}};
     for (const std::array<int, 3>& t : s.triangles)

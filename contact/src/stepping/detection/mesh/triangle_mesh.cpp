@@ -19,7 +19,13 @@ constexpr double kFlat = 1e-9;     // radian: smaller bends between triangles ar
 constexpr double kNoArea = 1e-14;  // least ratio of twice the area to the longest edge squared
 constexpr double kBelow = 1e-7;    // radian: neighbours of a top may rise by this angle
 
-// Joins equal points: returns the index of each point in `different`.
+struct HalfEdge {
+  int low, high;  // corners
+  int triangle, side;
+};
+
+}  // namespace
+
 std::vector<int> welded(const std::vector<Vector3d>& points, std::vector<Vector3d>& different) {
   std::vector<int> order(points.size()), number(points.size());
   std::iota(order.begin(), order.end(), 0);
@@ -34,13 +40,6 @@ std::vector<int> welded(const std::vector<Vector3d>& points, std::vector<Vector3
   }
   return number;
 }
-
-struct HalfEdge {
-  int low, high;  // corners
-  int triangle, side;
-};
-
-}  // namespace
 
 bool TriangleMesh::Triangle::sharp() const {
   const auto any = [](const std::array<char, 3>& a) { return a[0] != 0 || a[1] != 0 || a[2] != 0; };

@@ -7,6 +7,10 @@
 
 namespace tether::contact::detail {
 
+/// Joins points that are equal to the last bit: the index of each in `different`.
+std::vector<int> welded(const std::vector<Eigen::Vector3d>& points,
+                        std::vector<Eigen::Vector3d>& different);
+
 /// Triangles whose corners run counterclockwise seen from the side of the bodies. Corners that are
 /// equal to the last bit are joined. Triangles without an area touch nothing.
 class TriangleMesh {

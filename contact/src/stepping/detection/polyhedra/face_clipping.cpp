@@ -49,38 +49,68 @@ void FaceClipper::clip(const Placed& reference, int face, const Placed& other, d
   const double offset = reference.face(face).offset;
   const double same = kSame * size;
   const int opposite = lowest_face(other, n, same);
-  polygon_.clear();
   if (opposite < 0) return;
-  // Seen from the reference face this loop runs clockwise, which clipping does not mind.
-  for (int k = 0; k < other.loop_size(opposite); ++k) {
-    const int v = other.loop(opposite)[at(k)];
-    polygon_.push_back({other.vertex(v), v & 0x7ff, k});
-  }
-  for (int k = 0; k < reference.loop_size(face) && !polygon_.empty(); ++k)
-    clip_to(reference.inward(face, k), reference.corner(face, k), k, same);
-  merge(same);
-  for (const Corner& c : polygon_) {
-    const double gap = n.dot(c.point) - offset;
-    if (gap > least && gap < margin) out.add(c.point, c.point - gap * n, n, gap, mark | c.feature);
-  }
+  int number = 0;  // of the pair of pieces
+  for (const Polyhedron::Face::Piece& to : reference.shape->faces[at(face)].open)
+    for (const Polyhedron::Face::Piece& subject : other.shape->faces[at(opposite)].open) {
+      clip_piece(reference, face, to, other, subject, 8 * number++, same);
+      for (const Corner& c : polygon_) {
+        const double gap = n.dot(c.point) - offset;
+        if (gap > least && gap < margin && !c.seam)
+          out.add(c.point, c.point - gap * n, n, gap, mark | c.feature);
+      }
+    }
 }
 
-// A cut within `same` of a corner gets the feature of the corner. Otherwise the identities of
-// contacts between faces of equal size would change with rounding.
-void FaceClipper::clip_to(const Vector3d& inward, const Vector3d& on_plane, int plane,
-                          double same) {
+// Clips a piece of the opposite face to one of the reference face. Edges are numbered from `first`.
+void FaceClipper::clip_piece(const Placed& reference, int face, const Polyhedron::Face::Piece& to,
+                             const Placed& other, const Polyhedron::Face::Piece& subject, int first,
+                             double same) {
+  polygon_.clear();
+  // Seen from the reference face this loop runs clockwise, which clipping does not mind.
+  const std::vector<int>& loop = subject.loop;
+  for (std::size_t k = 0; k < loop.size(); ++k) {
+    const bool seam = subject.seam[k] != 0, before = subject.seam[k > 0 ? k - 1 : loop.size() - 1];
+    polygon_.push_back({other.vertex(loop[k]),
+                        loop[k] & 0x7ff,
+                        {first + static_cast<int>(k), false, seam},
+                        seam && before});
+  }
+  for (std::size_t k = 0; k < to.loop.size() && !polygon_.empty(); ++k)
+    clip_to(reference.inward(face, to.loop, k), reference.vertex(to.loop[k]),
+            reference.vertex(to.loop[k + 1 < to.loop.size() ? k + 1 : 0]),
+            {first + static_cast<int>(k), true, to.seam[k] != 0}, same);
+  merge(same);
+}
+
+// A cut within `same` of a corner is that corner. Otherwise the identities of contacts between
+// faces of equal size would change with rounding.
+void FaceClipper::clip_to(const Vector3d& inward, const Vector3d& from, const Vector3d& to,
+                          const Line& plane, double same) {
+  const auto is_end = [&](const Vector3d& x) {
+    const double s = (x - from).dot(to - from), length2 = (to - from).squaredNorm();
+    const double slack = same * std::sqrt(length2);
+    return std::abs(s) < slack || std::abs(s - length2) < slack;
+  };
   clipped_.clear();
   cut_polygon(
-      polygon_.size(), inward, on_plane,
+      polygon_.size(), inward, from,
       [&](std::size_t k) -> const Vector3d& { return polygon_[k].point; },
       [&](std::size_t k) { clipped_.push_back(polygon_[k]); },
       [&](std::size_t k, std::size_t next, const Vector3d& x, bool leaves) {
-        int feature = 2048 + (polygon_[k].edge * 181 + plane) % 30000;
+        const Line& edge = polygon_[k].edge;
+        const int number = edge.number + (edge.of_reference ? 128 : 0);
+        int feature = 2048 + (number * 181 + plane.number) % 30000;
+        bool seam =
+            edge.of_reference ? edge.seam && plane.seam : plane.seam || (edge.seam && !is_end(x));
         for (const Corner* end : {&polygon_[k], &polygon_[next]})
-          if ((x - end->point).squaredNorm() < same * same) feature = end->feature;
+          if ((x - end->point).squaredNorm() < same * same) {
+            feature = end->feature;
+            seam = end->seam;
+          }
         // After a cut that leaves the half-space the polygon follows the side plane, else the rest
         // of the edge.
-        clipped_.push_back({x, feature, leaves ? 128 + plane : polygon_[k].edge});
+        clipped_.push_back({x, feature, leaves ? plane : edge, seam});
       });
   polygon_.swap(clipped_);
 }

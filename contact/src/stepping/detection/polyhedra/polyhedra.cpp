@@ -14,10 +14,6 @@ using Eigen::Vector3d;
 
 namespace {
 
-// A face is preferred to a pair of edges whose separation is larger by less than this part of the
-// smaller thickness.
-constexpr double kTie = 1e-4;
-
 // Sets `to` to a polyhedron at its pose, relative to a common origin.
 void place(const Polyhedron& shape, const Pose& pose, const Vector3d& origin, Placed& to) {
   to.shape = &shape;
@@ -36,8 +32,11 @@ bool meet_as_polyhedra(ShapeKind a, ShapeKind b) {
 
 void PolyhedraContacts::collide(const Shape& a, const Polyhedron& of_a, const Pose& A,
                                 const Shape& b, const Polyhedron& of_b, const Pose& B,
-                                double margin, NearPoints& out) {
+                                double margin, NearPoints& out, const SeamTest* seam_a,
+                                const SeamTest* seam_b) {
   const int from = out.count;
+  a_.is_seam = seam_a;
+  b_.is_seam = seam_b;
   const Vector3d origin = A.position;
   if (is_polyhedron(a.kind) && is_polyhedron(b.kind)) {
     place(of_a, A, origin, a_);
@@ -71,27 +70,36 @@ void PolyhedraContacts::polyhedra(double margin, NearPoints& out) {
   const double size = std::min(a_.now.size, b_.now.size), tie = kTie * size;
   const double rounding = kEqual * size;
   const FaceAxis A = best_face(a_, b_, rounding);
-  if (A.separation >= margin) return;
+  if (A.most >= margin) return;
   const FaceAxis B = best_face(b_, a_, rounding);
-  if (B.separation >= margin) return;
-  if (A.face < 0 || B.face < 0) return;  // positions are NaN, which the step reports
+  if (B.most >= margin) return;
+  if (A.face < 0 && B.face < 0) return;  // seams, or positions that are NaN: the step reports those
   const EdgeAxis E = best_edges(a_, b_, rounding);
-  if (E.separation >= margin) return;
+  if (E.most >= margin) return;
   const double best = std::max(A.separation, B.separation);
+  constexpr double kAll = -std::numeric_limits<double>::infinity();
+  const int before = out.count;
   if (E.separation > best + tie) {
-    const int before = out.count;
     crossing_edges(a_, b_, E, tie, margin, out);
+    if (out.count == before) return;
     // The bodies may turn about a single point within the step. Points over the face that are
     // still open may close then, so they are added.
-    if (out.count > before) over_face(A, B, tie, margin, size, 0, out);
-    return;
+    if (!at_seam(out, before)) return over_face(A, B, tie, margin, size, 0, out);
+  } else if (A.face >= 0 && B.face >= 0 && std::abs(A.separation - B.separation) < tie) {
+    const Vector3d &nA = a_.face(A.face).normal, &nB = b_.face(B.face).normal;
+    // Both faces separate equally well but are oblique to each other: edges touch.
+    if (-nA.dot(nB) < 1 - 0.5 * kFlatAngle * kFlatAngle) {
+      edge_along_edge(a_, b_, (nA - nB).normalized(), rounding, margin, out);
+      if (out.count == before || !at_seam(out, before)) return;
+    }
   }
-  const Vector3d &nA = a_.face(A.face).normal, &nB = b_.face(B.face).normal;
-  // Both faces separate equally well but are oblique to each other: edges touch.
-  if (std::abs(A.separation - B.separation) < tie &&
-      -nA.dot(nB) < 1 - 0.5 * kFlatAngle * kFlatAngle)
-    return edge_along_edge(a_, b_, (nA - nB).normalized(), rounding, margin, out);
-  over_face(A, B, tie, margin, size, -std::numeric_limits<double>::infinity(), out);
+  out.count = before;
+  over_face(A, B, tie, margin, size, kAll, out);
+}
+
+bool PolyhedraContacts::at_seam(const NearPoints& out, int k) const {
+  const NearPoint& p = out.point[linalg::at(k)];
+  return a_.seam(p.on_first, -p.normal) || b_.seam(p.on_second, p.normal);
 }
 
 // The reference is the face of the first body unless that of the second one is clearly better, so

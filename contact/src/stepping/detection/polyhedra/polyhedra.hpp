@@ -6,6 +6,10 @@
 
 namespace tether::contact::detail {
 
+/// A face is preferred to a pair of edges whose separation is larger by less than this part of the
+/// smaller thickness.
+constexpr double kTie = 1e-4;
+
 inline bool is_polyhedron(ShapeKind k) { return form(k).family() == ShapeForm::Family::polyhedron; }
 
 /// Whether PolyhedraContacts serves this pair: boxes and hulls against each other, capsules against
@@ -25,13 +29,16 @@ bool meet_as_polyhedra(ShapeKind a, ShapeKind b);
 class PolyhedraContacts {
  public:
   /// Adds all contacts with a gap below `margin`; normals point from b to a. `of_a` and `of_b` are
-  /// the polyhedra of boxes and hulls, ignored for other shapes.
+  /// the polyhedra of boxes and hulls, ignored for other shapes. The tests, of points about the
+  /// position of a, are for those that are parts of a body.
   void collide(const Shape& a, const Polyhedron& of_a, const Pose& A, const Shape& b,
-               const Polyhedron& of_b, const Pose& B, double margin, NearPoints& out);
+               const Polyhedron& of_b, const Pose& B, double margin, NearPoints& out,
+               const SeamTest* seam_a = nullptr, const SeamTest* seam_b = nullptr);
 
  private:
   void other_on_polyhedron(const Shape& other, Pose pose, double margin, NearPoints& out);
   void polyhedra(double margin, NearPoints& out);
+  bool at_seam(const NearPoints& out, int k) const;
   void over_face(const FaceAxis& A, const FaceAxis& B, double tie, double margin, double size,
                  double least, NearPoints& out);
 

@@ -31,6 +31,7 @@ void finish(Polyhedron& p) {
   p.size = std::numeric_limits<double>::infinity();
   for (std::size_t f = 0; f < p.faces.size(); ++f) {
     Polyhedron::Face& face = p.faces[f];
+    face.open = {{face.loop, std::vector<char>(face.loop.size(), 0)}};
     face.normal = newell(p.vertices, face.loop).normalized();
     face.offset = 0;
     for (const int v : face.loop) face.offset += face.normal.dot(p.vertices[at(v)]);

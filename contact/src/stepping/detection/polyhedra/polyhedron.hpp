@@ -17,6 +17,12 @@ struct Polyhedron {
     Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // outwards
     double offset = 0;                                  // normal . x on the face
     std::vector<int> loop;  // vertices, counterclockwise seen from outside
+    // The convex pieces of it that no other part of the body lies against; see seams.hpp.
+    struct Piece {
+      std::vector<int> loop;
+      std::vector<char> seam;  // of each edge: whether another part goes on beyond it in the plane
+    };
+    std::vector<Piece> open;
   };
   struct Edge {
     int from, to;

@@ -9,6 +9,7 @@
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
+using linalg::at;
 
 namespace {
 
@@ -17,15 +18,18 @@ constexpr double kFlat = 1e-9;  // radian: an axis within this angle lies along 
 // Finds the point of the surface nearest to c and the outward normal there. Returns the distance,
 // negative inside.
 double nearest_point(const Placed& b, const Vector3d& c, Vector3d& point, Vector3d& normal) {
+  const auto is_open = [&](int f) { return !b.shape->faces[at(f)].open.empty(); };
+  // Inside, the way out leads through a face that is open.
   int best = 0;
   double height = -std::numeric_limits<double>::infinity();
   for (int f = 0; f < static_cast<int>(b.now.faces.size()); ++f) {
     const double h = b.face(f).normal.dot(c) - b.face(f).offset;
-    if (h > height) {
+    if (h > height && (h > 0 || is_open(f))) {
       height = h;
       best = f;
     }
   }
+  if (!is_open(best) && height < 0) return std::numeric_limits<double>::infinity();
   normal = b.face(best).normal;
   point = c - height * normal;
   if (height <= 0) return height;
@@ -92,7 +96,8 @@ void round_on_polyhedron(const Round& round, const Placed& b, double margin, Nea
     const double right = n.dot(b.face(e.right).normal.cross(v));
     if (std::min(left, right) > slack || std::max(left, right) < -slack) continue;
     if (n.dot(b.face(e.left).normal + b.face(e.right).normal) <= 0) continue;
-    out.add(x - round.radius * n, y, n, distance - round.radius, 2 + static_cast<int>(k % 60000));
+    out.add(x - round.radius * n, y, n, distance - round.radius,
+            kCapsuleOnEdge + static_cast<int>(k % 60000));
   }
 }
 

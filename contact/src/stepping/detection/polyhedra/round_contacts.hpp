@@ -12,6 +12,8 @@ struct Round {
   bool capsule;
 };
 
+constexpr int kCapsuleOnEdge = 2;  // first feature of these points
+
 // Adds contacts of a ball, or of both ends of a capsule and of the points at which its axis passes
 // an edge between them.
 void round_on_polyhedron(const Round& round, const Placed& polyhedron, double margin,

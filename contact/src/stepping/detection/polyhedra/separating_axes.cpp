@@ -4,10 +4,34 @@
 
 #include <algorithm>
 
+#include "stepping/detection/polyhedra/edge_contacts.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
 using linalg::at;
+
+namespace {
+
+// All that b turns to face f of a is a seam.
+bool meets_seam(const Placed& a, int f, const Placed& b, double least, double rounding) {
+  const Vector3d& n = a.face(f).normal;
+  return b.is_seam != nullptr &&
+         std::none_of(b.now.vertices.begin(), b.now.vertices.end(), [&](const Vector3d& v) {
+           return n.dot(v) <= least + rounding && !b.seam(v, -n);
+         });
+}
+
+bool meet_at_seam(const Placed& a, const Placed& b, const EdgeAxis& axis) {
+  if (a.is_seam == nullptr && b.is_seam == nullptr) return false;
+  const Polyhedron::Edge &e = a.shape->edges[at(axis.first)], &g = b.shape->edges[at(axis.second)];
+  const Vector3d &p = a.vertex(e.from), &q = b.vertex(g.from);
+  Vector3d on_a, on_b;
+  nearest(p, a.vertex(e.to) - p, q, b.vertex(g.to) - q, on_a, on_b);
+  return a.seam(on_a, axis.normal) || b.seam(on_b, -axis.normal);
+}
+
+}  // namespace
 
 FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
   FaceAxis best;
@@ -15,7 +39,11 @@ FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
     double least = std::numeric_limits<double>::infinity();
     for (const Vector3d& v : b.now.vertices) least = std::min(least, a.face(f).normal.dot(v));
     const double separation = least - a.face(f).offset;
-    if (separation > best.separation + rounding) best = {separation, f};
+    best.most = std::max(best.most, separation);
+    if (!(separation > best.separation + rounding)) continue;
+    if (a.shape->faces[at(f)].open.empty() || meets_seam(a, f, b, least, rounding)) continue;
+    best.separation = separation;
+    best.face = f;
   }
   return best;
 }
@@ -40,7 +68,10 @@ EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
       n /= length;
       if (n.dot(n1) + n.dot(n2) < 0) n = -n;
       const double separation = n.dot(b.vertex(g.from) - a.vertex(e.from));
-      if (separation > best.separation + rounding) best = {separation, i, j, n};
+      best.most = std::max(best.most, separation);
+      if (!(separation > best.separation + rounding)) continue;
+      const EdgeAxis axis{separation, i, j, n, best.most};
+      if (!meet_at_seam(a, b, axis)) best = axis;
     }
   }
   return best;
