@@ -190,7 +190,8 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
                                                           double tolerance, bool fresh) {
   Moved moved;
   polish_.keep(candidate);
-  const Fix before = polishes_first() ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
+  const Fix before =
+      polishes_first() ? polish_.add_newton_step(candidate, cj, tolerance, false) : Fix();
   if (in_use(Mechanism::repeated_correction) && !before.corrector_was_right && !fresh) {
     moved.status = Status::success;
     moved.corrector_was_right = false;
@@ -209,7 +210,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
                             : wants_polish(moved.length);
   // The polish is a refinement: if F or the linear solver fails in it, the move stands. A fatal
   // flag is kept by the corrector and ends the run.
-  const Fix after = polishes ? polish_.add_newton_step(candidate, cj, tolerance) : Fix();
+  const Fix after = polishes ? polish_.add_newton_step(candidate, cj, tolerance, true) : Fix();
   moved.corrector_was_right = after.corrector_was_right;
   if (after.made) moved.status = movers_.used->settle(candidate, polish_.delta());
   return moved;

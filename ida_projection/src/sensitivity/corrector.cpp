@@ -349,7 +349,7 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
   apply(candidate);
   ++state_.statistics_.sensitivity_projections;
   if (!polish_->wanted(length, false)) return Status::success;
-  fix = polish_->add_newton_step(candidate, step.cj, tolerance);
+  fix = polish_->add_newton_step(candidate, step.cj, tolerance, true);
   if (!fix.made) return Status::success;
   status = find_moves(candidate, step.t, false, &length);
   if (status == Status::success) apply(candidate);

@@ -59,34 +59,29 @@ void Polish::keep(const Candidate& candidate) {
   N_VScale(1.0, candidate.correction, corrected_);
 }
 
-// F(t, (ypred - dy) + ycor_N, yppred + cj ycor_N) through IDA's own callback, which adds ycor to
-// IDA's ypred and yppred: ypred is shifted by -dy for the call and put back bit for bit.
+// delta = -J^-1 F(t, ypred + ycor_N, yppred + cj ycor_N).
+bool Polish::newton_step(N_Vector delta) {
+  if (corrector_.residual(corrected_, delta) != 0) return false;
+  ++statistics_.residual_evaluations;
+  N_VScale(-1.0, delta, delta);
+  return corrector_.solve_linear(delta);
+}
+
+// The same at ypred - dy: IDA's own callback adds ycor to IDA's ypred and yppred, so that ypred is
+// shifted for the call and put back bit for bit.
 bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
   N_VScale(1.0, candidate.base, work_);
   N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
   N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
-  const bool evaluated = corrector_.residual(corrected_, delta_) == 0;
+  const bool found = newton_step(delta_);
   N_VScale(1.0, work_, candidate.base);
-  N_VScale(-1.0, delta_, delta_);
-  return evaluated && corrector_.solve_linear(delta_);
-}
-
-// -J^-1 F at the corrector's point.
-bool Polish::know_noise() {
-  if (noise_known_) return true;
-  if (corrector_.residual(corrected_, noise_) != 0) return false;
-  ++statistics_.residual_evaluations;
-  N_VScale(-1.0, noise_, noise_);
-  noise_known_ = corrector_.solve_linear(noise_);
-  return noise_known_;
+  return found;
 }
 
 double Polish::response_length(const Candidate& candidate) {
   if (!know_noise()) return -1.0;
-  step_known_ = false;
-  if (!newton_step_at_moved_point(candidate)) return -1.0;
-  ++statistics_.residual_evaluations;
-  step_known_ = true;
+  step_known_ = newton_step_at_moved_point(candidate);
+  if (!step_known_) return -1.0;
   N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
   const double length = differential_length(candidate, work_);
   return std::isfinite(length) ? length : -1.0;
@@ -103,14 +98,11 @@ const double* Polish::response(const StepData& step) {
   return N_VGetArrayPointer(work_);
 }
 
-Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance) {
+Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance, bool moved) {
   if (in_use(Mechanism::forecast_polish) && forecast_polish(candidate, cj, tolerance))
     return {true, true};
   const bool known = step_known_;
-  if (!known) {
-    if (!newton_step_at_moved_point(candidate)) return {};
-    ++statistics_.residual_evaluations;
-  }
+  if (!known && !(moved ? newton_step_at_moved_point(candidate) : newton_step(delta_))) return {};
   step_known_ = false;
   ++iterations_;
 

@@ -10,7 +10,7 @@
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
-#include "step/foretold.hpp"
+#include "step/polish_forecast.hpp"
 
 namespace tether::ida_projection {
 
@@ -71,8 +71,8 @@ class Polish {
   }
   /// Before the move: keeps the corrector's ycor.
   void keep(const Candidate& candidate);
-  /// After the move: ycor <- ycor + delta, as far as delta can be trusted.
-  Fix add_newton_step(const Candidate& candidate, double cj, double tolerance);
+  /// ycor <- ycor + delta, as far as delta can be trusted. `moved`: after the move.
+  Fix add_newton_step(const Candidate& candidate, double cj, double tolerance, bool moved);
   /// Restores the corrector's ycor.
   void restore(const Candidate& candidate) {
     step_known_ = false;  // that move is not the next one
@@ -87,7 +87,9 @@ class Polish {
   long iterations() const { return iterations_; }    ///< in this solve()
 
  private:
-  bool know_noise();
+  /// -J^-1 F at the corrector's point.
+  bool know_noise() { return noise_known_ = noise_known_ || newton_step(noise_); }
+  bool newton_step(N_Vector delta);
   bool newton_step_at_moved_point(const Candidate& candidate);
   bool forecast_polish(const Candidate& candidate, double cj, double tolerance);
   void learn_pattern(const Candidate& candidate, double cj);

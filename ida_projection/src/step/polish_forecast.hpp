@@ -1,4 +1,4 @@
-// Tether: the iteration after the move, foretold. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the iteration after the move, forecast. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <algorithm>
@@ -27,23 +27,23 @@ class PolishForecast {
   }
   /// Learns from a computed delta.
   void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
-    const auto small = [&](N_Vector v, double most) { return N_VWrmsNorm(v, weights) <= most; };
+    const auto small = [&](N_Vector v) { return N_VWrmsNorm(v, weights) <= kUnseen; };
     const bool learnt = known(cj);
     if (learnt) {
       N_VLinearSum(1.0, delta, -share_at(cj), ycor, work_);
       N_VLinearSum(1.0, work_, -1.0, beyond_, work_);
-      allowance_ = small(work_, kUnseen) ? std::min(2 * allowance_ + 1, kMost) : allowance_ / 2;
+      allowance_ = small(work_) ? std::min(2 * allowance_ + 1, kMost) : allowance_ / 2;
     }
     N_VProd(ycor, weights, work_);
     const double square = N_VDotProd(work_, work_);
     N_VProd(work_, weights, work_);
     share_ = square > 0.0 ? N_VDotProd(work_, delta) / square : 0.0;
     N_VLinearSum(1.0, delta, -share_, ycor, beyond_);
-    if (!learnt) allowance_ = small(beyond_, kUnseen) ? 1 : 0;
+    if (!learnt) allowance_ = small(beyond_) ? 1 : 0;
     cj_ = cj;
     used_in_row_ = 0;
     N_VLinearSum(1.0, delta, kappa(cj), ycor, work_);
-    not_stiff_ = small(work_, kNotStiff);
+    not_stiff_ = small(work_);
   }
   /// Whether delta can be forecast for a correction with this cj.
   bool can_forecast(double cj) const { return used_in_row_ < allowance_ && known(cj); }
@@ -53,9 +53,8 @@ class PolishForecast {
   void used() { ++used_in_row_; }
 
  private:
-  static constexpr double kUnseen = 0.003;  // tolerances: allowed error of a forecast delta
-  static constexpr double kNotStiff =
-      0.03;                         // tolerances: |delta + kappa ycor| where F is not stiff
+  // Tolerances, a tenth of what IDA's convergence test leaves: errors that may be.
+  static constexpr double kUnseen = 0.03;
   static constexpr int kMost = 15;  // in a row
 
   double kappa(double cj) const { return (cj - cj_at_setup_) / (cj + cj_at_setup_); }
