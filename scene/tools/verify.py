@@ -71,7 +71,8 @@ class Scene:
                 self.fixed.add(name)
             if "drag" in body:
                 self.other.append("drag")
-        self.friction = {frozenset(pair["between"]): pair.get("friction", 0) for pair in data.get("pair", [])}
+        self.friction = {frozenset(pair["between"]): None if "friction_across" in pair else pair.get("friction", 0)
+                         for pair in data.get("pair", [])}
         self.joints = {joint.get("name", f"joint {n}"): joint for n, joint in enumerate(data.get("joint", []), 1)}
 
     def coefficient(self, first, second):

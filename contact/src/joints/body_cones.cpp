@@ -62,6 +62,16 @@ BodyCone contact_cone(const PointContact& p, double rolling, double torsional) {
   return out;
 }
 
+void scale_tangents(const std::array<Eigen::Vector3d, 2>& tangents, const PointContact& p,
+                    BodyCone& cone) {
+  const Eigen::Matrix3d frame = tangent_frame(p.normal);
+  Eigen::Matrix2d turn;
+  for (int k = 0; k < 2; ++k) turn.row(k) = frame.bottomRows<2>() * tangents[at(k)];
+  cone.J1.middleRows<2>(1) = (turn * cone.J1.middleRows<2>(1)).eval();
+  cone.J2.middleRows<2>(1) = (turn * cone.J2.middleRows<2>(1)).eval();
+  cone.bias.segment<2>(1) = (turn * cone.bias.segment<2>(1)).eval();
+}
+
 void BodyCones::find_islands(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
   const int n = static_cast<int>(cones.size()), nodes = mechanisms.count() + mechanisms.bodies();
   sets_.reset(nodes);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <tether/contact/body_solver.hpp>
 #include <tether/contact/cones.hpp>
 #include <tether/linalg/disjoint_sets.hpp>
@@ -31,6 +32,11 @@ struct BodyCone {
 /// surface, |moment_n| <= torsional x_n about the normal. Rows in its frame: the relative velocity
 /// at the point, and the relative angular velocities about the axes of its moments.
 BodyCone contact_cone(const PointContact& contact, double rolling = 0, double torsional = 0);
+
+/// Puts tangents of other lengths into the rows of a contact_cone: its slip and friction are those
+/// of an elliptic cone then (method, section 8).
+void scale_tangents(const std::array<Eigen::Vector3d, 2>& tangents, const PointContact& contact,
+                    BodyCone& cone);
 
 /// Solves cones of bodies island by island. Joints are eliminated by the sparse factors of
 /// G M^-1 G' (linalg::SparseMinimumNorm), so that cones see

@@ -3,6 +3,7 @@
 #include "joints/cone_islands.hpp"
 
 #include <algorithm>
+#include <array>
 #include <tether/linalg/index.hpp>
 
 namespace tether::contact::detail {
@@ -26,6 +27,15 @@ Options solver_options(const BodyOptions& options) {
   out.strict = options.strict;
   out.max_work = options.max_work;
   out.enough = options.enough;
+  return out;
+}
+
+// The impulse whose parts along the scaled tangents are its coordinates x: J' x is the impulse p.
+Vector3d in_circle(const std::array<Vector3d, 2>& tangents, const Vector3d& normal,
+                   const Vector3d& p) {
+  Vector3d out = normal.dot(p) * normal;
+  for (const Vector3d& t : tangents)
+    if (const double square = t.squaredNorm(); square > 0) out += t.dot(p) / (square * square) * t;
   return out;
 }
 
@@ -62,7 +72,7 @@ void ConeIslands::find_islands(const std::vector<PointContact>& contacts) {
     return at(sets_.root(moves(c.first) ? c.first : c.second));
   };
   for (const PointContact& c : contacts)
-    if (rolls(c)) is_mine_[root(c)] = 1;
+    if (rolls(c) || is_elliptic(c)) is_mine_[root(c)] = 1;
   mine_.clear();
   rest_.clear();
   for (std::size_t k = 0; k < contacts.size(); ++k)
@@ -79,9 +89,14 @@ void ConeIslands::add_contacts(const std::vector<PointContact>& contacts) {
     const PointContact& p = contacts[at(k)];
     const bool moments = rolls(p);
     const Meeting none, &m = moments ? near_->meeting(p) : none;
-    const BodyCone& c = cones_.emplace_back(contact_cone(p, m.rolling, m.torsional));
+    BodyCone& c = cones_.emplace_back(contact_cone(p, m.rolling, m.torsional));
     Vector6d impulse;
     impulse << last(p.id), moments ? last(moment_id(p.id)) : Vector3d(Vector3d::Zero());
+    if (is_elliptic(p)) {
+      const std::array<Vector3d, 2> tangents = near_->scaled_tangents(p);
+      scale_tangents(tangents, p, c);
+      impulse.head<3>() = in_circle(tangents, p.normal, impulse.head<3>());
+    }
     // The rows of forces have moments about the centre, too.
     for (int r = 0; r < c.cone.rows; ++r)
       start_of_.push_back(r < 3 ? c.J1.row(r).head<3>().dot(impulse.head<3>())

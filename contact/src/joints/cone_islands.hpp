@@ -13,12 +13,12 @@
 
 namespace tether::contact::detail {
 
-/// Solves islands that have a mechanism, or contacts with rolling or torsional friction.
+/// Solves islands that have a mechanism, or contacts with rolling, torsional or elliptic friction.
 class ConeIslands final : public JointIslands {
  public:
   /// The mechanisms belong to the joints of the stepper, which update them; without joints `laws`
-  /// is null. near: meetings whose contacts hold moments; null: none. moments: receives the moments
-  /// of all contacts of a solve, world axes, N m s; may be null.
+  /// is null. near: meetings whose contacts hold moments or have elliptic friction; null: none.
+  /// moments: receives the moments of all contacts of a solve, world axes, N m s; may be null.
   ConeIslands(Mechanisms& mechanisms, LawRows* laws, LawUse use, const BodyOptions& options,
               const NearContacts* near, std::vector<Eigen::Vector3d>* moments);
 
@@ -32,6 +32,9 @@ class ConeIslands final : public JointIslands {
 
  private:
   bool rolls(const PointContact& c) const { return near_ != nullptr && near_->meeting(c).rolls(); }
+  bool is_elliptic(const PointContact& c) const {
+    return near_ != nullptr && near_->meeting(c).is_elliptic();
+  }
   void find_islands(const std::vector<PointContact>& contacts);
   void add_contacts(const std::vector<PointContact>& contacts);
   void add_laws();
@@ -63,7 +66,7 @@ class ConeIslands final : public JointIslands {
   WarmStart start_;
 };
 
-/// Rolling friction in steps without joints; `near` must outlive it.
+/// Rolling and elliptic friction in steps without joints; `near` must outlive it.
 class RollingPart final : public IslandMaker {
  public:
   explicit RollingPart(const NearContacts& near) : near_(near) {}

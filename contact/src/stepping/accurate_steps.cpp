@@ -2,6 +2,7 @@
 #include "stepping/accurate_steps.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -68,7 +69,13 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
     const Vector3d& x = stepper_.contacts.impulses[k];
     if (x.isZero(0)) continue;
     const double normal = c.normal.dot(x);
-    const Vector3d tangent = x - normal * c.normal;
+    Vector3d tangent = x - normal * c.normal;
+    if (c.mu > 0 && stepper_.near->meeting(c).is_elliptic()) {
+      const std::array<Vector3d, 2> along = stepper_.near->scaled_tangents(c);
+      tangent.setZero();  // in the circular cone of the scaled tangents
+      for (const Vector3d& t : along)
+        if (const double size = t.norm(); size > 0) tangent += t.dot(x) / (size * size * size) * t;
+    }
     const bool slips = c.mu > 0 && !(tangent.norm() < kSlips * c.mu * normal);
     list.push_back(
         {c.id, slips ? Behaviour::slips : Behaviour::sticks, slips ? tangent : Vector3d::Zero()});

@@ -150,7 +150,8 @@ void SubStepper::solve_contacts() {
   if (end != SubStepEnd::whole) return;
   take_velocities(solution, bodies);
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
-  if (rolling) contacts.moments = joints ? joints->moments() : rolling->moments();
+  if (rolling && near->any_rolling())
+    contacts.moments = joints ? joints->moments() : rolling->moments();
 }
 
 // Whether a shorter sub-step would not help: none is allowed, or there is an impact, whose impulse

@@ -28,6 +28,14 @@ void check_rolling(const SteppingOptions& options) {
     throw std::invalid_argument("stepping: sleep does not go with rolling friction");
 }
 
+// The same of elliptic friction.
+void check_elliptic(const SteppingOptions& options) {
+  if (options.restitution_law != RestitutionLaw::newton)
+    throw std::invalid_argument("elliptic friction needs restitution_law = newton");
+  if (options.sleep > 0)
+    throw std::invalid_argument("stepping: sleep does not go with elliptic friction");
+}
+
 std::vector<double> body_sizes(const BodySet& bodies, const std::vector<Surface>& surfaces) {
   std::vector<double> out(bodies.mass.size(), 0);
   for (const Surface& each : surfaces) {
@@ -52,6 +60,7 @@ SubStepper::SubStepper(BodySet given, std::vector<Surface> surfaces,
     near = std::make_unique<NearContacts>(bodies, std::move(surfaces), meetings, options.law,
                                           options.near_part);
     if (near->any_rolling()) check_rolling(options);
+    if (near->any_elliptic()) check_elliptic(options);
     make_solvers();
     if (options.sleep > 0)
       sleeping = std::make_unique<Sleeping>(bodies, sizes, threshold_speed(options.sleep, options),
@@ -68,7 +77,8 @@ void SubStepper::make_solvers() {
   const double impact = threshold_speed(options.impact_threshold, options);
   const double bounce = threshold_speed(options.restitution_threshold, options);
   const bool laws = joints && joints->has_laws(), bounces = near && near->any_restitution();
-  if (near && near->any_rolling()) rolling = std::make_unique<RollingPart>(*near);
+  if (near && (near->any_rolling() || near->any_elliptic()))
+    rolling = std::make_unique<RollingPart>(*near);
   if (joints && rolling) joints->set_rolling(*near);
   IslandMaker* maker = rolling.get();
   if (joints) maker = joints.get();

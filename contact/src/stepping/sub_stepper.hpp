@@ -85,7 +85,7 @@ struct SubStepper {
   std::vector<PointContact> turned;  // contacts as of the middle of the step
   BodySolution solution;
   std::unique_ptr<JointPart> joints;     // only where they have been added
-  std::unique_ptr<RollingPart> rolling;  // only where a meeting names it
+  std::unique_ptr<RollingPart> rolling;  // only where a meeting names it, or elliptic friction
 
   SubStep now;
   SubStepEnd end = SubStepEnd::whole;

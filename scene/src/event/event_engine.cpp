@@ -193,7 +193,8 @@ void EventEngine::find_contact_states() const {
     c.force = units_.force() * model_->in_space(contact, forces[k]);
     VectorXd slip(3);
     slip << 0, motion.slip(static_cast<int>(k));
-    c.slip = units_.speed() * model_->in_space(contact, slip);
+    c.slip = units_.speed() *
+             (pair.elliptic ? model_->slip_of(contact) : model_->in_space(contact, slip));
     contacts_.push_back(c);
   }
 }

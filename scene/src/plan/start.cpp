@@ -27,7 +27,10 @@ Scene only_contacts(const Scene& scene) {
     body.velocity.setZero();
     body.angular_velocity.setZero();
   }
-  for (Pair& pair : out.pairs) pair.friction = pair.rolling = pair.torsional = 0;
+  for (Pair& pair : out.pairs) {
+    pair.friction = pair.rolling = pair.torsional = 0;
+    pair.friction_across.reset();
+  }
   SteppingOptions& steps = out.stepping.emplace();
   steps.error_reduction = 0;  // nothing moves
   steps.on_failure = OnFailure::warn;

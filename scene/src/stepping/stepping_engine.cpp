@@ -155,7 +155,8 @@ Mapped map_scene(const Scene& scene) {
     if (found == material.end()) continue;
     const SurfaceSpeed speed = body.surface.value_or(SurfaceSpeed{});
     for (const Shape& shape : body.shapes)
-      out.surfaces.push_back({index, shape, found->second, speed.velocity, speed.angular_velocity});
+      out.surfaces.push_back({index, shape, found->second, speed.velocity, speed.angular_velocity,
+                              body.friction_axis.value_or(Vector3d::Zero())});
   }
   for (const Pair& pair : scene.pairs) {
     if (!pair.touch) continue;

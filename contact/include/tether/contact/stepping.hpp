@@ -1,6 +1,7 @@
 // Tether: rigid bodies in motion, by impulses and velocities. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -92,6 +93,8 @@ struct Surface {
   /// axes: of a belt, a turntable. Friction acts against it.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< see velocity
+  /// Unit, body axes: the direction of Meeting::friction where that is elliptic; zero: none.
+  Eigen::Vector3d friction_axis = Eigen::Vector3d::Zero();
   /// Whether it moves against its body.
   bool moves_on_body() const { return !velocity.isZero(0) || !angular_velocity.isZero(0); }
 };
@@ -106,6 +109,13 @@ struct Meeting {
   double rolling = 0, torsional = 0;
   /// Whether contacts of these materials hold moments.
   bool rolls() const { return rolling > 0 || torsional > 0; }
+  /// Coefficient across the friction_axis of the surface of material `first`, along which
+  /// `friction` holds (method, section 8). Absent: `friction` in all directions.
+  std::optional<double> friction_across = {};
+  /// Whether the coefficients differ.
+  bool is_elliptic() const { return friction_across && *friction_across != friction; }
+  /// The larger coefficient.
+  double largest_friction() const { return std::max(friction, friction_across.value_or(0)); }
 };
 
 /// Velocities changed by forces during a step of length dt that starts at `time`.

@@ -42,6 +42,11 @@ void check(const Meeting& m) {
         "meeting: materials must be >= 0, friction >= 0 and finite, restitution 0 .. 1");
   if (!(m.rolling >= 0 && m.torsional >= 0) || !std::isfinite(m.rolling + m.torsional))
     throw std::invalid_argument("meeting: rolling and torsional must be >= 0 and finite");
+  if (!(m.friction_across.value_or(0) >= 0) || !std::isfinite(m.friction_across.value_or(0)))
+    throw std::invalid_argument("meeting: friction_across must be >= 0 and finite");
+  if (m.is_elliptic() && m.first == m.second)
+    throw std::invalid_argument(
+        "meeting: friction_across is of two materials: the first one has the axis");
 }
 
 }  // namespace
@@ -84,6 +89,7 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
   }
   find_polyhedra(bodies);
   join_parts();
+  take_axes();
 
   pose_.resize(surfaces_.size());
   for (const Surface& s : surfaces_) {
@@ -100,6 +106,37 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     still_[k] = !moves(bodies, s.body);
   }
   fixed_ = still_;
+}
+
+void NearContacts::take_axes() {
+  if (!any_elliptic()) return;
+  axis_.resize(surfaces_.size());
+  for (std::size_t k = 0; k < surfaces_.size(); ++k)
+    if (!surfaces_[k].friction_axis.isZero(0)) with_axis_.push_back(static_cast<int>(k));
+  for (const auto& [materials, m] : meetings_)
+    for (std::size_t k = 0; k < surfaces_.size() && m.is_elliptic(); ++k)
+      if (surfaces_[k].material == m.first && surfaces_[k].friction_axis.isZero(0))
+        throw std::invalid_argument("surface " + std::to_string(k) +
+                                    ": its material has elliptic friction, so that it needs a "
+                                    "friction_axis");
+}
+
+// The axis along the normal has no direction there: any one is taken.
+std::array<Vector3d, 2> NearContacts::scaled_tangents(const PointContact& c) const {
+  const Meeting& m = meeting(c);
+  const int first = first_surface(c);
+  const int k = surface(first).material == m.first ? first : second_surface(c);
+  Vector3d along = axis_[at(k)] - c.normal.dot(axis_[at(k)]) * c.normal;
+  if (!(along.squaredNorm() > 0)) along = tangent_frame(c.normal).row(1);
+  along.normalize();
+  return {m.friction / m.largest_friction() * along,
+          *m.friction_across / m.largest_friction() * c.normal.cross(along)};
+}
+
+bool NearContacts::any_elliptic() const {
+  return law_ != Law::frictionless &&
+         std::any_of(meetings_.begin(), meetings_.end(),
+                     [](const auto& m) { return m.second.is_elliptic(); });
 }
 
 void NearContacts::set_resting(const std::vector<char>& resting) {
@@ -216,6 +253,8 @@ void NearContacts::set_pose(const BodySet& bodies, int surface) {
 
 void NearContacts::place(const BodySet& bodies, double dt) {
   for (int k = 0; k < static_cast<int>(surfaces_.size()); ++k) set_pose(bodies, k);
+  for (const int k : with_axis_)
+    axis_[at(k)] = bodies.orientation[at(surface(k).body)] * surface(k).friction_axis;
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
     centre_[k] = pose_[at(bounded_[k])].position;
     // Meshes and planes add nothing to the margin: the size of the other shape decides.
@@ -328,7 +367,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
     c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
                            : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
     c.normal = p.normal;
-    c.mu = law_ == Law::frictionless ? 0 : m->friction;
+    c.mu = law_ == Law::frictionless ? 0 : m->largest_friction();
     if (conveys) {
       c.slip = surface_velocity(bodies, s, c.r1) - surface_velocity(bodies, t, c.r2);
       c.slip -= c.normal.dot(c.slip) * c.normal;

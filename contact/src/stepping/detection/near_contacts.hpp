@@ -1,6 +1,7 @@
 // Tether: contacts of a set of bodies. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <tether/contact/stepping.hpp>
@@ -47,6 +48,10 @@ class NearContacts {
   double size(const PointContact& c) const;
   bool any_restitution() const;
   bool any_rolling() const;
+  bool any_elliptic() const;
+  /// Two tangents at right angles of a contact with elliptic friction, after find(): each as long
+  /// as its coefficient over the larger one, which is PointContact::mu.
+  std::array<Eigen::Vector3d, 2> scaled_tangents(const PointContact& c) const;
 
  private:
   void find_polyhedra(const BodySet& bodies);
@@ -58,6 +63,7 @@ class NearContacts {
   void drop_seams(int first, int second);  // in near_
   // Whether a part beside surface k has x on an open face with the normal n.
   bool goes_on(int k, const Eigen::Vector3d& x, const Eigen::Vector3d& n) const;
+  void take_axes();
   const Meeting* meeting_of(int a, int b) const;  // of surfaces; null: they pass through
   void place(const BodySet& bodies, double dt);
   void set_pose(const BodySet& bodies, int surface);
@@ -82,8 +88,10 @@ class NearContacts {
   std::vector<int> index_;             // of each surface: k in bounded_, or ~k in planes_
   // For each surface.
   std::vector<Pose> pose_;
-  std::vector<char> centred_;  // whether it is a sphere about the centre of its body
-  std::vector<double> size_;   // its reach, infinite for planes
+  std::vector<char> centred_;          // whether it is a sphere about the centre of its body
+  std::vector<double> size_;           // its reach, infinite for planes
+  std::vector<int> with_axis_;         // surfaces with a friction_axis
+  std::vector<Eigen::Vector3d> axis_;  // of those, in world axes; by surface
   // For each bounded surface.
   std::vector<double> reach_;
   std::vector<Eigen::Vector3d> centre_;

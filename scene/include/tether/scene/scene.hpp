@@ -72,7 +72,8 @@ struct Body {
   std::string material;                                             ///< that Pair refers to
   std::optional<Drag> drag;                                         ///< none: no resistance
   std::optional<SurfaceSpeed> surface;                              ///< none: moves with the body
-  Place place;                                                      ///< in the file
+  std::optional<Eigen::Vector3d> friction_axis;  ///< unit, body axes; see Pair::friction_across
+  Place place;                                   ///< in the file
 };
 
 /// How two materials meet. A pair that no table names is an error when bodies of it can touch.
@@ -84,6 +85,12 @@ struct Pair {
   Place place;                        ///< in the file
   bool touch = true;                  ///< false: they pass through each other
   double rolling = 0, torsional = 0;  ///< m: moments over the normal force
+  /// Coefficient across the friction_axis of the body of material `first`, along which `friction`
+  /// holds; absent: `friction` in all directions.
+  std::optional<double> friction_across = {};
+
+  /// Whether the coefficients differ.
+  bool is_elliptic() const { return friction_across && *friction_across != friction; }
 };
 
 /// A frictionless ring or small pulley on a cable.

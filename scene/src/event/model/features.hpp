@@ -331,6 +331,14 @@ struct LineFeature {
 };
 
 /// One potential contact of a scene.
+/// Friction that depends on the direction: coefficients along and across an axis of a body, over
+/// the larger one.
+struct EllipticFriction {
+  int body = 0;   ///< that has the axis
+  Vector3d axis;  ///< unit, in its axes
+  double along = 1, across = 1;
+};
+
 struct FeaturePair {
   int first = 0, second = 0;  ///< bodies, as in Bodies
   Vector3d centre = Vector3d::Zero();
@@ -340,8 +348,9 @@ struct FeaturePair {
                RoundOnLine, PointOnCircle>
       on_second;
   double friction = 0, restitution = 0;
-  double rolling = 0, torsional = 0;  ///< m
-  double reach = kInfinity;           ///< of both shapes from the centres of their bodies, together
+  std::optional<EllipticFriction> elliptic;  ///< `friction` is the larger coefficient
+  double rolling = 0, torsional = 0;         ///< m
+  double reach = kInfinity;  ///< of both shapes from the centres of their bodies, together
 
   Touch touch(const Bodies& bodies) const {
     return std::visit(

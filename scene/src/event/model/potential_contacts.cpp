@@ -136,6 +136,22 @@ std::set<std::pair<int, int>> jointed(const Scene& scene) {
   return pairs;
 }
 
+void put_friction(const Scene& scene, const Pair& from, FeaturePair& pair) {
+  pair.friction = from.friction;
+  if (!from.is_elliptic()) return;
+  pair.friction = std::max(from.friction, *from.friction_across);
+  const bool first = scene.bodies[at(pair.first)].material == from.first;
+  const int with_axis = first ? pair.first : pair.second;
+  const Body& body = scene.bodies[at(with_axis)];
+  if (!body.friction_axis)
+    throw std::invalid_argument("body \"" + body.name +
+                                "\": its material has elliptic friction, so that it needs a "
+                                "friction_axis");
+  pair.elliptic =
+      EllipticFriction{with_axis, body.friction_axis->normalized(), from.friction / pair.friction,
+                       *from.friction_across / pair.friction};
+}
+
 }  // namespace
 
 // The engine has contacts whose gaps are smooth: points (vertices, centres of spheres, ends of
@@ -170,12 +186,12 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
       for (std::size_t s = 0; s < a.shapes.size(); ++s)
         for (std::size_t o = 0; o < b.shapes.size(); ++o) {
           FeaturePair pair;
-          pair.friction = found->second->friction;
           pair.restitution = found->second->restitution;
           pair.rolling = found->second->rolling;
           pair.torsional = found->second->torsional;
           pair.first = i;
           pair.second = j;
+          put_friction(scene, *found->second, pair);
           add(a.shapes[s], of_a[s], b.shapes[o], of_b[o], pair, out);
         }
       if (out.size() > kMostContacts)

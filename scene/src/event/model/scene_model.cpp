@@ -256,15 +256,67 @@ void SceneModel::evaluate_contact(int contact, ContactKinematics& out) {
   out.tangents.setZero(2, velocities());
   out.slip_rate.setZero(2);
   out.slip_rest.resize(2);
-  const std::array<Vector3d, 2> tangent = tangents_of(contact, touch.normal);
-  for (int k = 0; k < 2; ++k) {
+  const auto put = [&](int k, const Vector3d& tangent) {
     Row row = Row::Zero(velocities());
-    add_force(bodies, p.first, touch.point, tangent[at(k)], 1, row);
-    add_force(bodies, p.second, touch.point, tangent[at(k)], -1, row);
+    add_force(bodies, p.first, touch.point, tangent, 1, row);
+    add_force(bodies, p.second, touch.point, tangent, -1, row);
     out.tangents.row(k) = row;
-    out.slip_rate[k] = tangent[at(k)].dot(convey);
-    out.slip_rest[k] = tangent[at(k)].dot(rest);
+    out.slip_rate[k] = tangent.dot(convey);
+    out.slip_rest[k] = tangent.dot(rest);
+  };
+  if (p.elliptic) {
+    const std::array<Jet<double>, 2> tangent = scaled_tangents(p, touch);
+    const Vector3d slip = relative_velocity(p, touch) + convey;
+    for (int k = 0; k < 2; ++k) {
+      put(k, tangent[at(k)].x);
+      out.slip_rest[k] += tangent[at(k)].x1.dot(slip);
+    }
+    return;
   }
+  const std::array<Vector3d, 2> tangent = tangents_of(contact, touch.normal);
+  for (int k = 0; k < 2; ++k) put(k, tangent[at(k)]);
+}
+
+Vector3d SceneModel::relative_velocity(const FeaturePair& p, const Touch& touch) const {
+  const Frame<double>&A = bodies_.all().frames[at(p.first)],
+        &B = bodies_.all().frames[at(p.second)];
+  return A.v + A.W.cross(touch.point - A.x) - B.v - B.W.cross(touch.point - B.x);
+}
+
+Vector3d SceneModel::slip_of(int contact) const {
+  const FeaturePair& p = pair(contact);
+  const Touch touch = p.touch(bodies_.all());
+  Vector3d slip = relative_velocity(p, touch);
+  if (!surface_.empty())
+    slip += surface_velocity(p.first, touch).x - surface_velocity(p.second, touch).x;
+  return slip - touch.normal.dot(slip) * touch.normal;
+}
+
+// The axis along the normal has no direction there: any one is taken.
+std::array<Jet<double>, 2> SceneModel::scaled_tangents(const FeaturePair& p,
+                                                       const Touch& touch) const {
+  const EllipticFriction& e = *p.elliptic;
+  const Frame<double>& f = bodies_.all().frames[at(e.body)];
+  const Vector3d &n = touch.normal, &n1 = touch.normal_rate, axis = f.R * e.axis,
+                 axis1 = f.W.cross(axis);
+  Vector3d u = axis - n.dot(axis) * n;
+  Vector3d u1 = axis1 - (n1.dot(axis) + n.dot(axis1)) * n - n.dot(axis) * n1;
+  if (!(u.squaredNorm() > 0)) {
+    u = n.unitOrthogonal();
+    u1 = -u.dot(n1) * n;
+  }
+  const double length = u.norm();
+  Jet<double> first, second;
+  first.x = u / length;
+  first.x1 = (u1 - first.x.dot(u1) * first.x) / length;
+  second.x = n.cross(first.x);
+  second.x1 = n1.cross(first.x) + n.cross(first.x1);
+  first.x2 = second.x2 = Vector3d::Zero();  // nobody asks
+  for (const auto& [jet, scale] : {std::pair(&first, e.along), std::pair(&second, e.across)}) {
+    jet->x *= scale;
+    jet->x1 *= scale;
+  }
+  return {first, second};
 }
 
 Jet<double> SceneModel::surface_velocity(int body, const Touch& touch) const {
@@ -319,8 +371,13 @@ Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
   const bool turns = is_moment(contact), spins = turns && moment(contact).spin;
   if (turns) contact = moment(contact).pair;
-  const Vector3d normal = pair(contact).touch(bodies_.all()).normal;
-  const std::array<Vector3d, 2> tangent = tangents_of(contact, normal);
+  const Touch touch = pair(contact).touch(bodies_.all());
+  const Vector3d& normal = touch.normal;
+  std::array<Vector3d, 2> tangent = tangents_of(contact, normal);
+  if (pair(contact).elliptic && !turns) {
+    const std::array<Jet<double>, 2> scaled = scaled_tangents(pair(contact), touch);
+    tangent = {scaled[0].x, scaled[1].x};
+  }
   if (spins) return parts[1] * normal;
   return (turns ? 0 : parts[0]) * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
 }

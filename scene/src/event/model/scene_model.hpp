@@ -107,6 +107,8 @@ class SceneModel final : public Model {
   bool are_one(int contact, int other, double distance) override;
 
   Vector3d in_space(int contact, const VectorXd& parts) override;
+  /// Relative velocity of a pair at its point without the normal part, world axes.
+  Vector3d slip_of(int contact) const;
 
   void to_coordinates(const double* row, double* gradient) const override;
   int own_rows() const override { return bodies_.count(); }
@@ -153,11 +155,14 @@ class SceneModel final : public Model {
   }
   void add_moments();
   bool conveys(int body) const { return !surface_.empty() && surface_[at(body)].has_value(); }
+  Vector3d relative_velocity(const FeaturePair& pair, const Touch& touch) const;
   /// Velocity of the surface of a body at a point, and its rate where the point moves.
   Jet<double> surface_velocity(int body, const Touch& touch) const;
   void evaluate_moment(const Moment& moment, ContactKinematics& out);
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
+  /// Tangents with their rates, each as long as its coefficient of friction over the larger one.
+  std::array<Jet<double>, 2> scaled_tangents(const FeaturePair& pair, const Touch& touch) const;
 
   double time_unit_, length_unit_;
   smooth::MovingBodies bodies_;
