@@ -31,27 +31,33 @@ bool meet_at_seam(const Placed& a, const Placed& b, const EdgeAxis& axis) {
   return a.seam(on_a, axis.normal) || b.seam(on_b, -axis.normal);
 }
 
-}  // namespace
-
-FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
+// The search among parts with seams leaves out axes; both bodies without are the common case.
+template <bool kSeams>
+FaceAxis best_face_of(const Placed& a, const Placed& b, double rounding) {
   FaceAxis best;
   for (int f = 0; f < static_cast<int>(a.now.faces.size()); ++f) {
     double least = std::numeric_limits<double>::infinity();
     for (const Vector3d& v : b.now.vertices) least = std::min(least, a.face(f).normal.dot(v));
     const double separation = least - a.face(f).offset;
-    best.most = std::max(best.most, separation);
+    if constexpr (kSeams) {
+      best.most = std::max(best.most, separation);
+      if (a.shape->faces[at(f)].open.empty()) continue;
+    }
     if (!(separation > best.separation + rounding)) continue;
-    if (a.shape->faces[at(f)].open.empty() || meets_seam(a, f, b, least, rounding)) continue;
+    if (kSeams && meets_seam(a, f, b, least, rounding)) continue;
     best.separation = separation;
     best.face = f;
   }
+  if (!kSeams) best.most = best.separation;
   return best;
 }
 
 // An edge is an arc between the normals of its faces on the Gauss sphere. Only edges whose arcs
 // cross can touch (Gregorius, The Separating Axis Test between Convex Polyhedra, 2013).
-EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
+template <bool kSeams>
+EdgeAxis best_edges_of(const Placed& a, const Placed& b, double rounding) {
   EdgeAxis best;
+  double most = best.most, largest = best.separation + rounding;
   for (int i = 0; i < static_cast<int>(a.shape->edges.size()); ++i) {
     const Polyhedron::Edge& e = a.shape->edges[at(i)];
     const Vector3d &n1 = a.face(e.left).normal, &n2 = a.face(e.right).normal;
@@ -68,13 +74,31 @@ EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
       n /= length;
       if (n.dot(n1) + n.dot(n2) < 0) n = -n;
       const double separation = n.dot(b.vertex(g.from) - a.vertex(e.from));
-      best.most = std::max(best.most, separation);
-      if (!(separation > best.separation + rounding)) continue;
-      const EdgeAxis axis{separation, i, j, n, best.most};
-      if (!meet_at_seam(a, b, axis)) best = axis;
+      if constexpr (kSeams) most = std::max(most, separation);
+      if (!(separation > largest)) continue;
+      if (kSeams && meet_at_seam(a, b, {separation, i, j, n, 0})) continue;
+      best = {separation, i, j, n, 0};
+      largest = separation + rounding;
     }
   }
+  best.most = kSeams ? most : best.separation;
   return best;
+}
+
+bool have_seams(const Placed& a, const Placed& b) {
+  return a.is_seam != nullptr || b.is_seam != nullptr;
+}
+
+}  // namespace
+
+FaceAxis best_face(const Placed& a, const Placed& b, double rounding) {
+  return have_seams(a, b) ? best_face_of<true>(a, b, rounding)
+                          : best_face_of<false>(a, b, rounding);
+}
+
+EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
+  return have_seams(a, b) ? best_edges_of<true>(a, b, rounding)
+                          : best_edges_of<false>(a, b, rounding);
 }
 
 }  // namespace tether::contact::detail
