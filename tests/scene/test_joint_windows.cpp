@@ -397,6 +397,135 @@ from = 0.2
   }
 }
 
+TEST_CASE("a joint breaks at a peak of its reaction between the ends of a step") {
+  // A load of 0.5 Hz, of which the engines take eight steps a period, exceeds the bound by 1e-5.
+  const std::string text = R"(
+[scene]
+end = 3
+[[body]]
+name = "block"
+mass = 1
+inertia = [0.1, 0.1, 0.1]
+[[joint]]
+kind = "fixed"
+bodies = ["block", "world"]
+at = [0, 0, 0]
+break_force = 9.9999
+[[load]]
+body = "block"
+force = [10, 0, 0]
+sine = { frequency = 0.5, phase_deg = 0 }
+)";
+  const double time = std::asin(0.99999) / M_PI;
+  for (const EngineKind kind : kExactOnes) {
+    const auto engine = engine_of(scene_of(text), kind, 1e-8);
+    engine->advance(3);
+    REQUIRE(engine->events().size() == 1);
+    CHECK(std::abs(engine->events()[0].time - time) < 1e-9);
+    // v' = 10 sin(pi t) from then on.
+    CHECK(engine->bodies()[0].velocity.x() ==
+          Approx(10 / M_PI * (std::cos(M_PI * time) - std::cos(3 * M_PI))).epsilon(1e-6));
+  }
+}
+
+TEST_CASE(
+    "joints that cannot close together, and bodies that overlap when let go, end the run by name") {
+  const std::string driven = R"(
+[scene]
+end = 1
+[[body]]
+name = "carriage"
+mass = 1
+inertia = [0.2, 0.3, 0.4]
+velocity = [1, 0, 0]
+[[joint]]
+name = "rail"
+kind = "slider"
+bodies = ["carriage", "world"]
+axis = [1, 0, 0]
+motion = { rate = 1 }
+[[joint]]
+name = "clamp"
+kind = "fixed"
+bodies = ["carriage", "world"]
+at = [0, 0, 0]
+from = 0.5
+)";
+  for (const EngineKind kind : kAll) {
+    const auto engine = engine_of(scene_of(driven), kind, accuracy_of(kind));
+    const std::string why = tether::test::thrown<SimulationError>([&] { engine->advance(1); });
+    CHECK(contains(why, "t = 0.5 s"));
+    CHECK(contains(why, "cannot close"));
+  }
+  const std::string nested = R"(
+[scene]
+end = 1
+[[body]]
+name = "a"
+shape = "sphere"
+radius = 1
+mass = 1
+material = "m"
+[[body]]
+name = "b"
+shape = "sphere"
+radius = 1
+mass = 1
+position = [1.5, 0, 0]
+material = "m"
+[[pair]]
+between = ["m", "m"]
+[[joint]]
+kind = "fixed"
+bodies = ["a", "b"]
+at = [0, 0, 0]
+to = 0.5
+)";
+  const auto engine = engine_of(scene_of(nested), EngineKind::event, 1e-6);
+  const std::string why = tether::test::thrown<SimulationError>([&] { engine->advance(1); });
+  CHECK(contains(why, "detach"));
+  CHECK(contains(why, "overlap"));
+}
+
+TEST_CASE(
+    "a body at rest that is coupled to a driven one gets its speed, and the energy it takes") {
+  const std::string text = R"(
+[scene]
+end = 1
+[[body]]
+name = "engine"
+mass = 5
+inertia = [1, 1, 1]
+velocity = [2, 0, 0]
+[[body]]
+name = "wagon"
+mass = 3
+inertia = [1, 1, 1]
+position = [4, 0, 0]
+[[joint]]
+name = "rail"
+kind = "slider"
+bodies = ["engine", "world"]
+axis = [1, 0, 0]
+motion = { rate = 2 }
+[[joint]]
+name = "hook"
+kind = "ball"
+bodies = ["engine", "wagon"]
+at = [4, 0, 0]
+from = 0.5
+)";
+  for (const EngineKind kind : kAll) {
+    const auto engine = engine_of(scene_of(text), kind, accuracy_of(kind));
+    engine->advance(0.5);
+    REQUIRE(engine->events().size() == 1);
+    CHECK(engine->events()[0].lost == Approx(-0.5 * 3 * 4).epsilon(1e-9));
+    CHECK(engine->bodies()[1].velocity.x() == Approx(2).epsilon(1e-9));
+    engine->advance(1);
+    CHECK(engine->bodies()[1].position.x() == Approx(5).epsilon(1e-8));
+  }
+}
+
 TEST_CASE("a run with joints that attach and break goes on from a saved state with its bits") {
   const std::string text = two_bodies(kWeld + "to = 0.7\n");
   for (const EngineKind kind : kAll)
@@ -426,6 +555,10 @@ TEST_CASE("what windows of joints do not have is refused by name") {
   CHECK(contains(why_not(rod + "break_force = 0\n"), "break_force"));
   CHECK(contains(why_not(rod + "break_forces = 1\n"), "break_forces"));
   CHECK(contains(why_not(rod + "to = 1\n[event]\notherwise = \"stepping\"\n"), "otherwise"));
+  Scene late = scene_of(kRod);
+  late.event.emplace().otherwise = Otherwise::stepping;  // as --otherwise does
+  CHECK(contains(tether::test::thrown<std::invalid_argument>([&] { make_engine(late); }),
+                 "otherwise"));
   Scene scene = scene_of(kRod);
   CHECK(contains(tether::test::thrown<std::invalid_argument>([&] { make_smooth_engine(scene); }),
                  "make_engine"));

@@ -40,25 +40,39 @@ Bracket narrowed(const F& f, Bracket at, double resolution) {
   return {a, fa, b, fb};
 }
 
-/// The first time from a to b at which f is above 0; infinite: there is none. Between the ends its
-/// top is looked for on the parabola through both and the middle.
+/// A time from a to b at which f is above 0, where it is not so at a and b; infinite: there is
+/// none. Successive parabolas look for the top.
+template <class F>
+double above_between(const F& f, double a, double fa, double b, double fb) {
+  constexpr int kMostParabolas = 8;
+  double m = 0.5 * (a + b), fm = f(m);
+  for (int k = 0; k < kMostParabolas && !(fm > 0); ++k) {
+    const double to_a = (fm - fa) / (m - a), to_b = (fb - fm) / (b - m);
+    const double top = 0.5 * (a + m) - 0.5 * to_a * (b - a) / (to_b - to_a);
+    if (!(to_b < to_a) || !(top > a && top < b) || top == m) break;
+    const double value = f(top);
+    const bool higher = value > fm;
+    if (higher == (top > m))
+      a = higher ? m : top, fa = higher ? fm : value;
+    else
+      b = higher ? m : top, fb = higher ? fm : value;
+    if (higher) m = top, fm = value;
+  }
+  return fm > 0 ? m : kInfinity;
+}
+
+/// The first time from a to b at which f is above 0; infinite: there is none.
 template <class F>
 double first_above(const F& f, double a, double b) {
   constexpr double kRounding = 4e-16;
   const double fa = f(a);
   if (fa > 0) return a;
-  double end = 0.5 * (a + b), value = f(end);
+  double end = b, value = f(b);
   if (!(value > 0)) {
-    const double fb = f(b), bend = fa - 2 * value + fb;
-    const double top = 0.5 * (fa - fb) / bend;  // from the middle, in halves of the interval
-    if (bend < 0 && std::abs(top) < 1) {
-      const double peak = end + top * 0.5 * (b - a);
-      value = f(peak);
-      end = peak;
-    }
-    if (!(value > 0)) value = fb, end = b;
+    end = above_between(f, a, fa, b, value);
+    if (std::isinf(end)) return kInfinity;
+    value = f(end);
   }
-  if (!(value > 0)) return kInfinity;
   return narrowed(f, {a, fa, end, value}, kRounding * std::abs(b)).b;
 }
 

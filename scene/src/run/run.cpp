@@ -125,6 +125,7 @@ class Run {
   // Steps can go on where events cannot.
   void hand_over() {
     if (plan_.engine != EngineKind::event || engine_->in_steps()) return;
+    if (any_of(scene_.joints, [](const Joint& each) { return each.window.has_value(); })) return;
     if (scene_.output["state"].empty()) {
       result_.remarks.emplace_back(
           "with [event] otherwise = \"stepping\" (--otherwise stepping) the run goes on in steps "

@@ -48,6 +48,13 @@ void check(const Scene& scene) {
       refuse(joint, "break_force and break_moment must be > 0");
     if (w.from > 0 && joint.motion) refuse(joint, "what closes later has no motion");
   }
+  for (const Coupling& coupling : scene.couplings)
+    for (const int j : coupling.joints)
+      if (const Joint& joint = scene.joints[at(j)]; joint.window)
+        refuse(joint, "a coupling names it, whose joints hold always");
+  if (goes_on_in_steps(scene))
+    throw std::invalid_argument(
+        "[event] otherwise = \"stepping\" is not for scenes whose joints attach, detach or break");
 }
 
 class SwitchingEngine final : public Engine {
