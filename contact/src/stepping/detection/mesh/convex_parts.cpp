@@ -340,8 +340,8 @@ class Splitter {
           "may fill, or a surface of fewer triangles");
   }
 
-  // The planes of triangles with a part of the surface in front of them, and those that halve the
-  // angles of hollow edges. False: no part is in front by more than the concavity.
+  // The planes of triangles which some of the surface is in front of by more than the concavity,
+  // and those that halve the angles of hollow edges. False: there is no such triangle.
   bool find_cuts(const Cell& cell, std::vector<Plane>& cuts) {
     std::vector<int> planes;
     std::size_t corners = 0;
@@ -352,16 +352,14 @@ class Splitter {
     std::sort(planes.begin(), planes.end());
     planes.erase(std::unique(planes.begin(), planes.end()), planes.end());
     work(planes.size() * corners);
-    double most = 0;
     for (const int p : planes) {
       double height = 0;
       for (const Piece& each : cell.surface)
         for (const Vector3d& x : each.corners) height = std::max(height, solid_.plane(p).height(x));
-      most = std::max(most, height);
-      if (height > kOn) cuts.push_back(solid_.plane(p));
+      if (height > concavity_) cuts.push_back(solid_.plane(p));
     }
     faces_ = cuts.size();
-    if (!(most > concavity_)) return false;
+    if (cuts.empty()) return false;
     for (const Hollow& h : cell.hollows) {
       const Vector3d m =
           (solid_.plane(h.plane[0]).normal - solid_.plane(h.plane[1]).normal).normalized();
@@ -374,7 +372,7 @@ class Splitter {
   // an edge, then that which cuts fewer triangles, then that which halves their number, so that few
   // parts are left where hollows may stay; then the first.
   Plane best_of(const Cell& cell, const std::vector<Plane>& cuts) {
-    work(cuts.size() * (2 * cell.hollows.size() + 3 * cell.surface.size()));
+    work(2 * cuts.size() * cell.hollows.size());
     std::array<std::size_t, 4> least{};
     const Plane* best = nullptr;
     for (std::size_t k = 0; k < cuts.size(); ++k) {
@@ -384,6 +382,7 @@ class Splitter {
         score[0] += side == Side::in ? 0 : side == Side::both ? 2 : 1;
       }
       if (best != nullptr && score[0] > least[0]) continue;
+      work(3 * cell.surface.size());
       std::size_t below = 0, above = 0;
       for (const Piece& each : cell.surface) {
         const Side side = side_of(each.corners, cuts[k]);
