@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <problems/andrews.hpp>
+#include <problems/governor.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/transistor_amplifier.hpp>
 
@@ -104,6 +105,19 @@ TEST_CASE("smooth steps begin after ten refused ones in a row, where the index i
     CHECK(host.steps() > 100);
   }
   CHECK(begun >= 1);
+}
+
+TEST_CASE("smooth steps begin where every third step is refused at order 1 for ever") {
+  // The response of stiff dampers to moves is as long as the error that order 1 allows.
+  const Problem problem = governor(1.0, "index 0");
+  for (const double tolerance : {7e-6, 6.5e-6}) {
+    INFO("tolerance " << tolerance);
+    const Run run = integrate(problem, tolerance, problem.recommended_constraints(), {}, false);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.statistics.smoothing_begun == 1);
+    CHECK(run.steps <= 400);  // 4000 without
+    CHECK(run.error <= 10.0 * tolerance);
+  }
 }
 
 TEST_CASE("smooth steps begin at once at any size whose Jacobians cost as much as the look") {

@@ -1,6 +1,7 @@
 // Tether: control of IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
 #include "step/step_control.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "step/polish.hpp"
@@ -9,7 +10,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kTrapped = 10;      // steps in a row with failed error tests
+constexpr int kTrapped = 30;      // ten steps in a row with failed error tests, see refused_
 constexpr int kRefused = 3;       // failed error tests in one step
 constexpr int kOftenRefused = 4;  // steps for each failed error test, of the run so far
 
@@ -25,7 +26,7 @@ void StepControl::reset() {
   smoother_.reset();
   order_limit_.reset();
   algebraic_test_.begin({});
-  refused_in_row_ = 0;
+  refused_ = 0;
   last_error_failures_ = 0;
   corrector_has_failed_ = false;
 }
@@ -95,19 +96,20 @@ void StepControl::compare_slopes(const Candidate& candidate, long steps, N_Vecto
 }
 
 // IDA may double its step right after a doubling was rejected, and raises the order only after k +
-// 2 steps of one size. At order 1 a failed error test in each step can therefore go on for ever.
+// 2 steps of one size. At order 1 a failed error test in each step, or after each three of one
+// size, can therefore go on for ever.
 void StepControl::count_refusals(bool engaged) {
   if (smoother_.on()) return;
   const long failures = ida_.error_test_failures();
-  refused_in_row_ = failures > last_error_failures_ ? refused_in_row_ + 1 : 0;
+  refused_ =
+      failures > last_error_failures_ ? refused_ + kOftenRefused - 1 : std::max(0, refused_ - 1);
   last_error_failures_ = failures;
-  if (engaged && refused_in_row_ >= kTrapped) begin_smoothing(SetpointFactors());
+  if (engaged && refused_ >= kTrapped) begin_smoothing(SetpointFactors());
 }
 
 bool StepControl::struggling() const {
   if (!options_.suppress_algebraic) return false;
-  return refused_in_row_ >= kTrapped ||
-         ida_.error_test_failures() - last_error_failures_ >= kRefused;
+  return refused_ >= kTrapped || ida_.error_test_failures() - last_error_failures_ >= kRefused;
 }
 
 // A host that never tested algebraic variables, by IDASetSuppressAlg, may start off their

@@ -67,7 +67,8 @@ class StepControl {
   OwnedVector kept_slope_, slope_;  // y' of a step and of the next one, for the order
   double weights_factor_ = 1.0;     // by which IDA's weights were multiplied in the last solve
   bool corrector_has_failed_ = false;
-  int refused_in_row_ = 0;  // accepted steps that needed more than one attempt
+  // Grows by three for an accepted step that needed more than one attempt, falls by one for others.
+  int refused_ = 0;
   long last_error_failures_ = 0;
 };
 
