@@ -48,8 +48,9 @@ double above_between(const F& f, double a, double fa, double b, double fb) {
   double m = 0.5 * (a + b), fm = f(m);
   for (int k = 0; k < kMostParabolas && !(fm > 0); ++k) {
     const double to_a = (fm - fa) / (m - a), to_b = (fb - fm) / (b - m);
+    if (!(to_b < to_a)) break;
     const double top = 0.5 * (a + m) - 0.5 * to_a * (b - a) / (to_b - to_a);
-    if (!(to_b < to_a) || !(top > a && top < b) || top == m) break;
+    if (!(top > a && top < b) || top == m) break;
     const double value = f(top);
     const bool higher = value > fm;
     if (higher == (top > m))
@@ -67,6 +68,7 @@ double first_above(const F& f, double a, double b) {
   constexpr double kRounding = 4e-16;
   const double fa = f(a);
   if (fa > 0) return a;
+  if (a == b) return kInfinity;
   double end = b, value = f(b);
   if (!(value > 0)) {
     end = above_between(f, a, fa, b, value);

@@ -264,7 +264,7 @@ void NearContacts::place(const BodySet& bodies, double dt) {
 }
 
 // Longest way of a point of bounded surface k in the step.
-double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const {
+inline double NearContacts::way(const BodySet& bodies, std::size_t k, double dt) const {
   const Surface& s = surface(bounded_[k]);
   const RigidBody& b = bodies.motion[at(s.body)];
   const double arm = reach_[k] + s.shape.position.norm();
@@ -281,10 +281,21 @@ void NearContacts::find_points(int i, int j, double margin) {
     meshes_[at(mesh_[at(i)])].collide(t, T, S, margin, near_);
     return turn(near_, 0);
   }
+  const bool polyhedra = meet_as_polyhedra(s.kind, t.kind);
+  if (has_seams(i) || has_seams(j)) {
+    if (polyhedra || s.kind == ShapeKind::points || t.kind == ShapeKind::points)
+      return find_beside_seams(i, j, margin);
+  } else if (polyhedra) {
+    return polyhedra_.collide(s, polyhedron_[at(i)], S, t, polyhedron_[at(j)], T, margin, near_);
+  }
+  collide(s, S, t, T, margin, near_);
+}
+
+// The same where the directions of seams give no contacts.
+void NearContacts::find_beside_seams(int i, int j, double margin) {
+  const Shape &s = surface(i).shape, &t = surface(j).shape;
+  const Pose &S = pose_[at(i)], &T = pose_[at(j)];
   const bool i_has = has_seams(i), j_has = has_seams(j);
-  const bool points = s.kind == ShapeKind::points || t.kind == ShapeKind::points;
-  if (!meet_as_polyhedra(s.kind, t.kind) && !(points && (i_has || j_has)))
-    return collide(s, S, t, T, margin, near_);
   const auto of_i = [&](const Vector3d& x, const Vector3d& n) {
     return is_seam(i, S.position + x, n, kTie);
   };

@@ -55,6 +55,7 @@ class NearContacts {
 
  private:
   void find_polyhedra(const BodySet& bodies);
+  void find_beside_seams(int first, int second, double margin);
   void join_parts();
   bool is_seam(int surface, const Eigen::Vector3d& x, const Eigen::Vector3d& n, double angle) const;
   bool has_seams(int surface) const {
