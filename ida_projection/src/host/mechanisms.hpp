@@ -15,7 +15,7 @@ namespace tether::ida_projection {
 /// the others: metric, polish, smoothing, limit of the order, index and suppression.
 enum class Mechanism {
   repeated_correction,    ///< after a stale Jacobian has fooled IDA's test
-  polish_first,           ///< with many rows the polish precedes the move
+  polish_first,           ///< the polish precedes the move
   forecast_polish,        ///< the polish is forecast without an evaluation of F
   followers,              ///< IDA's test waits for algebraic variables that follow
   free_multipliers,       ///< IDA's convergence test leaves out multipliers of index 2
