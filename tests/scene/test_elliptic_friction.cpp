@@ -6,24 +6,15 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
-#include "linalg/thrown.hpp"
+#include "engines_of_texts.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
+using namespace tether::test;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 namespace {
-
-Scene scene_of(const std::string& text) { return parse_scene(text, "test"); }
-
-// `accuracy`: the tolerance, or the step.
-std::unique_ptr<Engine> engine_of(Scene scene, EngineKind kind, double accuracy) {
-  scene.engine = kind;
-  if (kind == EngineKind::event) scene.event.emplace().tolerance = accuracy;
-  if (kind == EngineKind::stepping) scene.stepping.emplace().step = accuracy;
-  return make_engine(scene);
-}
 
 constexpr EngineKind kBoth[] = {EngineKind::event, EngineKind::stepping};
 
@@ -92,14 +83,6 @@ friction = 0
 friction_across = {}
 )",
                      across);
-}
-
-std::string why_not(const std::string& text) {
-  return tether::test::thrown<std::exception>([&] { make_engine(scene_of(text)); });
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 }  // namespace

@@ -3,17 +3,16 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/plan.hpp>
 
-#include "linalg/thrown.hpp"
+#include "engines_of_texts.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
+using namespace tether::test;
 using Eigen::Vector3d;
 
 namespace {
 
 constexpr EngineKind kSmoothOnes[] = {EngineKind::smooth, EngineKind::event};
-
-Scene scene_of(const std::string& text) { return parse_scene(text, "test"); }
 
 // x of m x'' + c x' + k x = 0.
 double oscillation(double m, double c, double k, double x0, double v0, double t) {
@@ -98,47 +97,7 @@ double error_of_wheels(const Engine& engine) {
 }
 
 // A flywheel pair that floats, or its like on a ball, out of line with both centres.
-std::string floating(const std::string& joint) {
-  return R"(
-[scene]
-end = 3
-[[body]]
-name = "a"
-mass = 1
-inertia = [0.2, 0.3, 0.4]
-velocity = [0.1, 0.2, 0.3]
-angular_velocity = [0.5, -0.4, 1]
-[[body]]
-name = "b"
-mass = 3
-inertia = [0.5, 0.7, 0.6]
-position = [1, 0.2, 0]
-velocity = [-0.1, 1.2, 0.8]
-angular_velocity = [0.5, -0.4, 1]
-[[joint]]
-name = "between"
-bodies = ["a", "b"]
-)" + joint;
-}
-
-std::string why_not(const std::string& text) {
-  return tether::test::thrown<std::exception>([&] { make_engine(scene_of(text)); });
-}
-
-bool contains(const std::string& text, const char* part) {
-  return text.find(part) != std::string::npos;
-}
-
-std::unique_ptr<Engine> engine_of(Scene scene, EngineKind kind, double tolerance) {
-  if (kind == EngineKind::smooth) {
-    scene.engine = EngineKind::smooth;
-    scene.smooth.emplace().tolerance = tolerance;
-  } else {
-    scene.engine = EngineKind::event;
-    scene.event.emplace().tolerance = tolerance;
-  }
-  return make_engine(scene);
-}
+std::string floating(const std::string& joint) { return two_bodies("3", "[0.5, -0.4, 1]", joint); }
 
 }  // namespace
 

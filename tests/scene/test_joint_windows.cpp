@@ -8,10 +8,11 @@
 #include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 
-#include "linalg/thrown.hpp"
+#include "engines_of_texts.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;
+using namespace tether::test;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -21,30 +22,11 @@ constexpr double kGravity = 9.81;
 constexpr EngineKind kExactOnes[] = {EngineKind::smooth, EngineKind::event};
 constexpr EngineKind kAll[] = {EngineKind::smooth, EngineKind::event, EngineKind::stepping};
 
-Scene scene_of(const std::string& text) { return parse_scene(text, "test"); }
-
-// `accuracy`: the tolerance, or the step.
-std::unique_ptr<Engine> engine_of(Scene scene, EngineKind kind, double accuracy) {
-  scene.engine = kind;
-  if (kind == EngineKind::smooth) scene.smooth.emplace().tolerance = accuracy;
-  if (kind == EngineKind::event) scene.event.emplace().tolerance = accuracy;
-  if (kind == EngineKind::stepping) scene.stepping.emplace().step = accuracy;
-  return make_engine(scene);
-}
-
 double accuracy_of(EngineKind kind) { return kind == EngineKind::stepping ? 1e-3 : 1e-10; }
 
 double energy_of(const Engine& engine) {
   const Diagnostics d = engine.diagnostics();
   return d.kinetic_energy + d.potential_energy;
-}
-
-std::string why_not(const std::string& text) {
-  return tether::test::thrown<std::exception>([&] { make_engine(scene_of(text)); });
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 const std::string kFalling = R"(
@@ -105,28 +87,8 @@ struct BrokenRod {
 };
 
 // Two bodies that turn and pass each other; `joint` holds them together from 0.3 s on.
-std::string two_bodies(const std::string& joint) {
-  return R"(
-[scene]
-end = 1
-[[body]]
-name = "a"
-mass = 1
-inertia = [0.2, 0.3, 0.4]
-velocity = [0.1, 0.2, 0.3]
-angular_velocity = [0.5, -0.4, 1]
-[[body]]
-name = "b"
-mass = 3
-inertia = [0.5, 0.7, 0.6]
-position = [1, 0.2, 0]
-velocity = [-0.1, 1.2, 0.8]
-angular_velocity = [-0.7, 0.2, 0.4]
-[[joint]]
-name = "between"
-bodies = ["a", "b"]
-from = 0.3
-)" + joint;
+std::string passing(const std::string& joint) {
+  return two_bodies("1", "[-0.7, 0.2, 0.4]", "from = 0.3\n" + joint);
 }
 
 const std::string kWeld = "kind = \"fixed\"\nat = [0, 0, 0]\n";
@@ -216,7 +178,7 @@ TEST_CASE("steps break a rod at the end of a step, with errors of the order of t
 
 TEST_CASE("two bodies that weld in flight keep both momenta, and lose what a rigid body has not") {
   for (const EngineKind kind : kAll) {
-    const Scene scene = scene_of(two_bodies(kWeld));
+    const Scene scene = scene_of(passing(kWeld));
     const auto engine = engine_of(scene, kind, accuracy_of(kind));
     const auto free = engine_of(
         [&] {
@@ -254,7 +216,7 @@ TEST_CASE("every kind of joint closes as its bodies are, and conserves both mome
   };
   for (const std::string& joint : kinds)
     for (const EngineKind kind : kAll) {
-      const auto engine = engine_of(scene_of(two_bodies(joint)), kind, accuracy_of(kind));
+      const auto engine = engine_of(scene_of(passing(joint)), kind, accuracy_of(kind));
       engine->advance(0.299);
       const Diagnostics before = engine->diagnostics();
       engine->advance(1);
@@ -272,7 +234,7 @@ TEST_CASE("every kind of joint closes as its bodies are, and conserves both mome
 }
 
 TEST_CASE("a hinge that attaches counts its angle from there, and detaches at its time") {
-  const std::string text = two_bodies(
+  const std::string text = passing(
       "kind = \"hinge\"\nat = [0.5, 0, 0]\naxis = [0, 1, 1]\nto = 0.6\n"
       "spring = { stiffness = 5 }\n");
   for (const EngineKind kind : kExactOnes) {
@@ -527,7 +489,7 @@ from = 0.5
 }
 
 TEST_CASE("a run with joints that attach and break goes on from a saved state with its bits") {
-  const std::string text = two_bodies(kWeld + "to = 0.7\n");
+  const std::string text = passing(kWeld + "to = 0.7\n");
   for (const EngineKind kind : kAll)
     for (const double saved : {0.2, 0.5, 0.8}) {
       const auto a = engine_of(scene_of(text), kind, kind == EngineKind::stepping ? 1e-3 : 1e-8);

@@ -123,6 +123,25 @@ TEST_CASE("a picture of costs takes any name and any table") {
   texts_of(cost_picture(scene, table));
 }
 
+TEST_CASE("a picture shows joints that hold at its end") {
+  // The rod carries twice the weight of the ball where it breaks, at 0.33 s.
+  const auto rods = [](double end) {
+    Scene scene = parse_scene(
+        "[scene]\nend = 1\ngravity = [0, 0, -9.81]\n[[body]]\nname = \"ball\"\nmass = 2\n"
+        "inertia = [0.1, 0.1, 0.1]\nposition = [0.7, 0, 0]\n[[joint]]\nname = \"rod\"\n"
+        "kind = \"distance\"\nbodies = [\"ball\", \"world\"]\nat = [[0.7, 0, 0], [0, 0, 0]]\n"
+        "break_force = 39.24\n",
+        "rod.toml");
+    scene.end = end;
+    scene.output["svg"] = (folder("pictures") / "rod.svg").string();
+    CHECK(run(scene).failure == "");
+    return content(scene.output["svg"]).find("stroke=\"#404040\" stroke-width=\"2\"") !=
+           std::string::npos;
+  };
+  CHECK(rods(0.2));
+  CHECK(!rods(0.6));
+}
+
 TEST_CASE("a picture of numbers at the ends of their range comes to its end") {
   // Ticks up to infinity were counted without end: of ratios beyond 1e308, and of their margins.
   Scene scene = parse_scene(

@@ -40,9 +40,15 @@ class PictureRecorder : public Recorder {
       : scene_(run.scene), file_(file), start_energy_(run.start_energy) {
     check_writable(file);
     bodies_ = std::min(scene_.bodies.size(), kManyBodies);
+    for (const Joint& joint : scene_.joints)
+      holds_.push_back(!joint.window ||
+                       (joint.window->from <= run.now && run.now < joint.window->to));
   }
 
   void record(const Engine& engine, const Diagnostics& d) override {
+    for (; events_ < engine.events().size(); ++events_)
+      if (const ContactEvent& each = engine.events()[events_]; is_of_joint(each.kind))
+        holds_[static_cast<std::size_t>(each.joint)] = each.kind == ContactEvent::Kind::attach;
     instants_.add(instant(engine, d));
   }
 
@@ -69,7 +75,11 @@ class PictureRecorder : public Recorder {
                 {{Vector2d(kScenePanel.left, 22), Anchor::begin}}, kPicture, {15, "#202020"});
     std::vector<const Poses*> motion;
     for (const Instant& now : instants_.all()) motion.push_back(&now.bodies);
-    draw_scene(canvas, scene_, motion, instants_.all().back().time, kScenePanel);
+    Scene at_end = scene_;
+    at_end.joints.clear();
+    for (std::size_t j = 0; j < holds_.size(); ++j)
+      if (holds_[j]) at_end.joints.push_back(scene_.joints[j]);
+    draw_scene(canvas, at_end, motion, instants_.all().back().time, kScenePanel);
     draw_curves(canvas, kEnergyPanel, 34, energies(), false, "energy / J");
     draw_curves(canvas, kErrorPanel, 240, errors(), true, "");
     return canvas.svg(title);
@@ -150,7 +160,8 @@ class PictureRecorder : public Recorder {
   const Scene& scene_;
   std::string file_;
   double start_energy_;
-  std::size_t bodies_ = 0;
+  std::size_t bodies_ = 0, events_ = 0;  // events of the engine so far
+  std::vector<bool> holds_;              // of each joint: it does at the last record
   Thinned<Instant> instants_{kMostRecords};
 };
 

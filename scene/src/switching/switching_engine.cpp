@@ -91,7 +91,12 @@ class SwitchingEngine final : public Engine {
   void switch_joints();
   void snap();
   std::size_t change(const std::vector<int>& joints, Kind kind, double lost);
-  double excess(const Forces& forces) const;
+  struct Load {
+    std::size_t joint = 0;  // of the engine
+    double share = 0;       // of its bound
+  };
+  Load largest_load(const Forces& forces) const;
+  double excess(const Forces& forces) const { return largest_load(forces).share - 1; }
   template <class Self>
   static void exchange(Self& self, binary::Archive& io);
 
@@ -181,12 +186,14 @@ void SwitchingEngine::append_events() {
   }
 }
 
-double SwitchingEngine::excess(const Forces& forces) const {
-  double most = 0;
-  for (std::size_t k = 0; k < joint_of_.size(); ++k)
-    if (const auto& window = scene_.joints[at(joint_of_[k])].window)
-      most = std::max(most, load_of(*window, forces.joints[k]));
-  return most - 1;
+SwitchingEngine::Load SwitchingEngine::largest_load(const Forces& forces) const {
+  Load most;
+  for (std::size_t k = 0; k < joint_of_.size(); ++k) {
+    const auto& window = scene_.joints[at(joint_of_[k])].window;
+    const double share = window ? load_of(*window, forces.joints[k]) : 0;
+    if (share > most.share) most = {k, share};
+  }
+  return most;
 }
 
 double SwitchingEngine::next_switch() const {
@@ -270,19 +277,9 @@ void SwitchingEngine::switch_joints() {
 }
 
 void SwitchingEngine::snap() {
-  const Forces forces = engine_->forces();
-  std::size_t most = 0;
-  double largest = 0;
-  for (std::size_t k = 0; k < joint_of_.size(); ++k) {
-    const auto& window = scene_.joints[at(joint_of_[k])].window;
-    const double load = window ? load_of(*window, forces.joints[k]) : 0;
-    if (load > largest) {
-      largest = load;
-      most = k;
-    }
-  }
+  const int joint = joint_of_[largest_load(engine_->forces()).joint];
   scene_.start = SceneStart{time(), bodies()};
-  change({joint_of_[most]}, Kind::snap, 0);
+  change({joint}, Kind::snap, 0);
   begin(holding());
 }
 
