@@ -56,7 +56,7 @@ TEST_CASE("event: a ball with restitution 0.99 rests after 90 s") {
   const auto engine = run(ball(1, 0.99), 1e-8, 90);
   const auto rests = of_kind(*engine, Kind::rest);
   REQUIRE(rests.size() == 1);
-  CHECK(std::abs(rests[0].time - 89.853204556160450) < 2e-7);
+  CHECK(std::abs(rests[0].time - 89.853204556160450) < 1.3e-7);
   CHECK(engine->counts().impacts == 1363);  // to 5e-6 m/s
 }
 
