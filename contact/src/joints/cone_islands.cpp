@@ -114,7 +114,7 @@ void ConeIslands::add_laws() {
 }
 
 void ConeIslands::take_laws() {
-  if (use_ != LawUse::all && use_ != LawUse::plastic) return;
+  if (law_of_.empty() || (use_ != LawUse::all && use_ != LawUse::plastic)) return;
   std::vector<double>& impulses = use_ == LawUse::all ? laws_->impulses : laws_->plastic;
   const Eigen::Index first = x_.size() - static_cast<Eigen::Index>(law_of_.size());
   for (std::size_t l = 0; l < law_of_.size(); ++l)
