@@ -134,7 +134,7 @@ TEST_CASE("surfaces: files are those beside the scene, and of a size", "[scene]"
   CHECK_THAT(folder.refusal(mesh_file("none.obj")), Contains("no such file"));
   CHECK_THAT(folder.refusal(mesh_file("a.obj|x")), Contains("without |"));
   folder.write("a.ply", "ply");
-  CHECK_THAT(folder.refusal(mesh_file("a.ply")), Contains(".obj or .stl"));
+  CHECK_THAT(folder.refusal(mesh_file("a.ply")), Contains(".obj, .stl or .msh"));
   folder.write("large.obj", std::string((64u << 20) + 1, '\n'));
   CHECK_THAT(folder.refusal(mesh_file("large.obj")), Contains("64 MiB"));
 }

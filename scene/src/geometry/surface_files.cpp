@@ -1,4 +1,4 @@
-// Tether: files of surfaces: OBJ, STL and heights. SPDX-License-Identifier: BSD-3-Clause
+// Tether: files of surfaces: OBJ, STL, MSH and heights. SPDX-License-Identifier: BSD-3-Clause
 #include "surface_files.hpp"
 
 #include <charconv>
@@ -100,20 +100,27 @@ std::uint32_t whole(std::string_view bytes, std::size_t at) {
   return out;
 }
 
+Vector3d point_of(std::string_view bytes, std::size_t at, const char* kind, std::size_t number) {
+  Vector3d out;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::uint32_t bits = whole(bytes, at + 4 * k);
+    float value = 0;
+    std::memcpy(&value, &bits, sizeof value);
+    if (!std::isfinite(value))
+      throw SurfaceError(fmt::format("{} {}: a number is not finite", kind, number));
+    out[static_cast<Eigen::Index>(k)] = static_cast<double>(value);
+  }
+  return out;
+}
+
 TriangleSurface parse_binary_stl(std::string_view bytes, std::size_t count) {
   TriangleSurface out;
   Corners corners(out);
   limit(count, kMostTriangles, "triangles");
   for (std::size_t t = 0; t < count; ++t) {
     std::array<Vector3d, 3> corner;
-    for (std::size_t k = 0; k < 9; ++k) {
-      const std::uint32_t bits = whole(bytes, kStlHead + kStlTriangle * t + 12 + 4 * k);
-      float value = 0;
-      std::memcpy(&value, &bits, sizeof value);
-      if (!std::isfinite(value))
-        throw SurfaceError(fmt::format("triangle {}: a number is not finite", t + 1));
-      corner[k / 3][static_cast<Eigen::Index>(k % 3)] = static_cast<double>(value);
-    }
+    for (std::size_t k = 0; k < 3; ++k)
+      corner[k] = point_of(bytes, kStlHead + kStlTriangle * t + 12 + 12 * k, "triangle", t + 1);
     corners.add(corner);
   }
   return out;
@@ -190,20 +197,51 @@ TriangleSurface parse_stl(std::string_view bytes) {
   return some(parse_text_stl(bytes));
 }
 
+/// MuJoCo's MSH: how many points, normals, texture coordinates and triangles there are, then these.
+TriangleSurface parse_msh(std::string_view bytes) {
+  constexpr std::size_t kHead = 16, kWord = 4;
+  std::size_t count[4] = {};
+  for (std::size_t k = 0; k < 4 && bytes.size() >= kHead; ++k) count[k] = whole(bytes, kWord * k);
+  const std::size_t faces = kHead + kWord * (3 * count[0] + 3 * count[1] + 2 * count[2]);
+  if (bytes.size() != faces + kWord * 3 * count[3] || bytes.empty())
+    throw SurfaceError("is no MSH: its length is not that of its numbers");
+  limit(count[0], kMostListed, "points");
+  limit(count[3], kMostTriangles, "triangles");
+  TriangleSurface out;
+  for (std::size_t k = 0; k < count[0]; ++k)
+    out.points.push_back(point_of(bytes, kHead + 12 * k, "point", k + 1));
+  for (std::size_t t = 0; t < count[3]; ++t) {
+    std::array<int, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t corner = whole(bytes, faces + kWord * (3 * t + k));
+      if (corner >= count[0])
+        throw SurfaceError(fmt::format("triangle {}: {} is no point", t + 1, corner));
+      corners[k] = static_cast<int>(corner);
+    }
+    out.triangles.push_back(corners);
+  }
+  return some(std::move(out));
+}
+
 }  // namespace
 
 // A scene from an untrusted source reads nothing but what lies beside it: no way out of its folder,
 // by a link either, and no device.
-std::string read_beside(const std::string& of, const std::string& name, std::string& path) {
+std::string read_beside(const std::string& of, const std::string& name, std::string& path,
+                        const std::string& within) {
   namespace fs = std::filesystem;
   std::error_code error;
-  const fs::path folder = fs::path(of).parent_path();
-  const fs::path base = fs::canonical(folder.empty() ? fs::path(".") : folder, error);
+  const auto place = [&error](const fs::path& folder) {
+    return fs::canonical(folder.empty() ? fs::path(".") : folder, error);
+  };
+  const fs::path base = place(fs::path(of).parent_path());
+  const fs::path fence = within.empty() || error ? base : place(within);
   const fs::path file = error ? fs::path() : fs::canonical(base / name, error);
   if (error || !fs::is_regular_file(file, error))
     throw SurfaceError("there is no such file beside the scene");
-  if (std::mismatch(base.begin(), base.end(), file.begin(), file.end()).first != base.end())
-    throw SurfaceError("must lie in the folder of the scene, or below it");
+  if (std::mismatch(fence.begin(), fence.end(), file.begin(), file.end()).first != fence.end())
+    throw SurfaceError(within.empty() ? "must lie in the folder of the scene, or below it"
+                                      : "must lie in the folder of --files, or below it");
   path = file.string();
   std::ifstream stream(file, std::ios::binary);
   std::string text = files::read_stream(stream, kLargestPart);
@@ -213,10 +251,13 @@ std::string read_beside(const std::string& of, const std::string& name, std::str
 }
 
 TriangleSurface parse_triangles(const std::string& name, std::string_view bytes) {
-  const std::string ending = std::filesystem::path(name).extension().string();
+  std::string ending = std::filesystem::path(name).extension().string();
+  for (char& c : ending)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   if (ending == ".obj") return parse_obj(bytes);
   if (ending == ".stl") return parse_stl(bytes);
-  throw SurfaceError("must end in .obj or .stl: no other mesh is read");
+  if (ending == ".msh") return parse_msh(bytes);
+  throw SurfaceError("must end in .obj, .stl or .msh: no other mesh is read");
 }
 
 Heights parse_heights(std::string_view text) {

@@ -1,4 +1,4 @@
-// Tether: files of surfaces: OBJ, STL and heights. SPDX-License-Identifier: BSD-3-Clause
+// Tether: files of surfaces: OBJ, STL, MSH and heights. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <Eigen/Core>
@@ -35,11 +35,14 @@ struct Heights {
   int columns = 0;
 };
 
-/// The bytes of `name`, a file in the folder of the file `of` or below, of at most 64 MiB; `path`
-/// gets the place. Throws SurfaceError.
-std::string read_beside(const std::string& of, const std::string& name, std::string& path);
+/// The bytes of `name`, seen from the folder of the file `of`: a file in that folder, or in
+/// `within` where it is not empty, or below, of at most 64 MiB; `path` gets the place. Throws
+/// SurfaceError.
+std::string read_beside(const std::string& of, const std::string& name, std::string& path,
+                        const std::string& within = {});
 
-/// The triangles of an .obj or .stl; equal corners of an STL are one point. Throws SurfaceError.
+/// The triangles of an .obj, .stl or .msh; equal corners of an STL are one point. Throws
+/// SurfaceError.
 TriangleSurface parse_triangles(const std::string& name, std::string_view bytes);
 
 TETHER_EXPORT_END

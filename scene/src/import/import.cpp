@@ -6,6 +6,7 @@
 #include <exception>
 #include <tether/scene/run.hpp>
 
+#include "mesh.hpp"
 #include "parts.hpp"
 #include "robot.hpp"
 #include "xml.hpp"
@@ -65,10 +66,12 @@ Model read(const Node& root, Problems& problems) {
 }
 
 Imported convert(std::string_view text, const std::string& file, const ImportOptions& options) {
-  Problems problems(file);
-  const Document document(text, problems);
+  Problems problems(file, options.files);
+  Document document(text, problems);
+  if (is(document.root(), "mujoco")) document.include_files(problems);
   Model model = read(document.root(), problems);
   problems.finish();
+  make_convex(model, options.hulls);
   if (model.step > 0 && !(options.end / model.step <= kMostSteps))
     problems.add(
         document.root().GetLineNum(), "option: timestep", fmt::format("{}", model.step),

@@ -19,7 +19,12 @@ struct ImportOptions {
   std::optional<double> ground;                           ///< m: the height of a plane to stand on
   std::optional<double> friction;  ///< of all contacts; without: as the file says, 1 in a URDF
   bool mend = false;               ///< inertias that no body has become the nearest ones
-  double end = 1;                  ///< s
+  bool hulls = false;              ///< meshes touch as their hulls, in a URDF, too
+  /// kg/m^3: links of a URDF without <inertial> weigh as their collision shapes.
+  std::optional<double> density;
+  /// Folder in or below which the files are that the robot names; empty: that of the robot.
+  std::string files;
+  double end = 1;  ///< s
 };
 
 struct Imported {

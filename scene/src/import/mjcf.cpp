@@ -71,7 +71,7 @@ void Reader::children(const Node& node, int of, const std::string& class_name) {
     } else if (is(*each, "light") || is(*each, "camera") || is(*each, "site")) {
       model_.remarks.add(fmt::format("<{}>", each->Name()));
     } else if (is(*each, "frame") || is(*each, "replicate") || is(*each, "composite") ||
-               is(*each, "flexcomp") || is(*each, "attach") || is(*each, "include")) {
+               is(*each, "flexcomp") || is(*each, "attach")) {
       problems_.add(each->GetLineNum(), path(*each), "",
                     "is not read; MuJoCo writes the model without it (mj_saveLastXML, or save in "
                     "its viewer)");
@@ -254,9 +254,6 @@ Model read_mjcf(const Node& root, Problems& problems) {
     if (is(*each, "worldbody")) {
       has_world = true;
       reader.world(*each);
-    } else if (is(*each, "include")) {
-      problems.add(each->GetLineNum(), "include", "",
-                   "other files are not read; MuJoCo writes the model in one file");
     } else if (!is(*each, "compiler") && !is(*each, "option") && !is(*each, "default")) {
       for (const Node* part = each->FirstChildElement(); part != nullptr;
            part = part->NextSiblingElement())

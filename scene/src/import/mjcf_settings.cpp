@@ -155,7 +155,7 @@ void read_mesh_asset(const Node& node, Settings& out, Problems& problems, Remark
                        "inertia", "content_type"});
   Shape mesh = Shape::mesh({}, {});
   if (!file.empty()) {
-    mesh = read_mesh(problems.file(), out.mesh_folder + file, scale, name, remarks).value_or(mesh);
+    mesh = read_mesh(problems, out.mesh_folder + file, scale, name, remarks).value_or(mesh);
   } else {
     for (std::size_t k = 0; k + 2 < vertices.size(); k += 3)
       mesh.points.push_back(

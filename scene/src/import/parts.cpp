@@ -172,12 +172,27 @@ void drop_round_off(std::vector<Part>& parts, Remarks& remarks) {
   }
 }
 
+/// Links to which the file gives no mass weigh as their shapes.
+void weigh_shapes(Model& model, double density) {
+  for (Link& link : model.links) {
+    if (link.is_weighed) continue;
+    const MassProperties solid = mass_properties(link.shapes);
+    if (!(solid.volume > 0)) continue;
+    link.mass = density * solid.volume;
+    link.centre = solid.centre;
+    link.inertia = density * solid.inertia;
+    model.remarks.add(
+        fmt::format("links without <inertial>, whose shapes weigh {} kg/m^3", density), link.name);
+  }
+}
+
 /// A scene needs something that moves.
 void check_moves(const Model& model, const std::vector<Part>& parts, Problems& problems) {
   if (any_of(parts, [](const Part& part) { return !part.gone && !part.fixed(); })) return;
   const bool joints = any_of(parts, [](const Part& p) { return p.gone; });
   problems.add(model.links.empty() ? 1 : model.links.front().line, "", "",
-               joints ? "nothing that moves has mass: its links need an <inertial>"
+               joints ? "nothing that moves has mass: its links need an <inertial>, or --density "
+                        "lets them weigh as their collision shapes"
                       : "nothing moves while the base is fixed: --base free lets it");
 }
 
@@ -300,6 +315,7 @@ std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
 }
 
 std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problems& problems) {
+  if (options.density) weigh_shapes(model, *options.density);
   const std::vector<LinkStart> starts = starts_of(model, options);
   std::vector<Part> parts = welded(model, starts);
   drop_round_off(parts, model.remarks);

@@ -84,6 +84,7 @@ struct Link {
   std::vector<Shape> shapes;                          ///< that touch, in the frame of the link
   std::optional<Touch> touch;                         ///< none: its shapes touch nothing
   bool scenery = false;                               ///< a thing of the world, not of the robot
+  bool is_weighed = true;                             ///< false: the file gives no mass
   int line = 0;
 };
 

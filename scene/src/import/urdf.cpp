@@ -162,15 +162,14 @@ std::optional<Shape> read_geometry(const Node& node, Problems& problems, Remarks
   return {};
 }
 
-std::vector<Shape> read_mesh_parts(const Node& node, const std::string& link, Problems& problems,
-                                   Remarks& remarks) {
+std::optional<Shape> read_urdf_mesh(const Node& node, const std::string& link, Problems& problems,
+                                    Remarks& remarks) {
   Tag tag(node, problems);
   const std::string name = tag.name("filename", "a file of a mesh");
   const Vector3d scale = tag.vector("scale", Vector3d::Ones());
   if (scale.cwiseAbs().minCoeff() == 0) tag.wrong("scale", "must be three numbers that are not 0");
   tag.finish(remarks);
-  const std::optional<Shape> mesh = read_mesh(problems.file(), name, scale, link, remarks);
-  return mesh ? parts_of(*mesh, link, remarks) : std::vector<Shape>();
+  return read_mesh(problems, name, scale, link, remarks);
 }
 
 void read_collision(const Node& node, Link& link, Problems& problems, Remarks& remarks) {
@@ -180,22 +179,20 @@ void read_collision(const Node& node, Link& link, Problems& problems, Remarks& r
   if (kind == nullptr)
     return problems.add(node.GetLineNum(), path(node) + ": geometry", "",
                         "is missing: a box, cylinder, sphere, capsule or mesh");
-  std::vector<Shape> shapes;
-  if (is(*kind, "mesh")) {
-    shapes = read_mesh_parts(*kind, link.name, problems, remarks);
-  } else if (std::optional<Shape> shape = read_geometry(*kind, problems, remarks)) {
-    shapes.push_back(std::move(*shape));
-  } else {
+  const bool is_mesh = is(*kind, "mesh");
+  std::optional<Shape> shape = is_mesh ? read_urdf_mesh(*kind, link.name, problems, remarks)
+                                       : read_geometry(*kind, problems, remarks);
+  if (!shape && !is_mesh) {
     const bool known =
         is(*kind, "box") || is(*kind, "sphere") || is(*kind, "cylinder") || is(*kind, "capsule");
     return remarks.add(
         fmt::format("collision geometry <{}>{}", kind->Name(), known ? " without size" : ""),
         link.name);
   }
-  for (Shape& shape : shapes) {
-    shape.position = origin * shape.position;
-    if (origin.linear() != Matrix3d::Identity()) shape.orientation = origin.linear();
-    link.shapes.push_back(std::move(shape));
+  if (shape) {
+    shape->position = origin.translation();
+    if (origin.linear() != Matrix3d::Identity()) shape->orientation = origin.linear();
+    link.shapes.push_back(std::move(*shape));
   }
   name_children(node, {"origin", "geometry"}, remarks);
   name_children(*geometry, {kind->Name()}, remarks);
@@ -209,6 +206,8 @@ Link read_link(const Node& node, Problems& problems, Remarks& remarks) {
   tag.finish(remarks, {"type"});
   if (const Node* const inertial = only_child(node, "inertial", problems))
     read_inertial(*inertial, link, problems, remarks);
+  else
+    link.is_weighed = false;
   for (const Node* each = node.FirstChildElement("collision"); each != nullptr;
        each = each->NextSiblingElement("collision"))
     read_collision(*each, link, problems, remarks);
@@ -223,9 +222,7 @@ void read_limit(const Node& node, bool has_range, LinkJoint& joint, Problems& pr
                 Remarks& remarks) {
   const Node* const limit = only_child(node, "limit", problems);
   if (limit == nullptr) {
-    if (has_range)
-      problems.add(node.GetLineNum(), path(node) + ": limit", "",
-                   "is missing: revolute and prismatic joints have one (continuous has none)");
+    if (has_range) remarks.add("joints without <limit>, which move freely", joint.name);
     return;
   }
   Tag tag(*limit, problems);

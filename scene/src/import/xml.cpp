@@ -7,6 +7,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "geometry/surface_files.hpp"
+
 namespace tether::scene::import {
 
 namespace {
@@ -148,6 +150,54 @@ Document::Document(std::string_view text, Problems& problems) {
       problems.add(second->GetLineNum(), path(*second), "", "a document has one root element");
   }
   problems.finish();
+}
+
+struct Document::Included {
+  std::set<std::string> files;
+  std::size_t bytes = 0;
+};
+
+void Document::include_files(Problems& problems) {
+  Included so_far;
+  include_files(*xml_.RootElement(), 1, so_far, problems);
+  problems.finish();
+}
+
+// As in MuJoCo files are seen from the folder of the first one, and none is included twice.
+void Document::include_files(Node& parent, int depth, Included& so_far, Problems& problems) {
+  if (depth > static_cast<int>(TINYXML2_MAX_ELEMENT_DEPTH))
+    return problems.add(parent.GetLineNum(), path(parent), "",
+                        fmt::format("with the files that are included, more than {} elements are "
+                                    "inside each other",
+                                    TINYXML2_MAX_ELEMENT_DEPTH));
+  for (Node* each = parent.FirstChildElement(); each != nullptr && problems.clean();) {
+    if (!is(*each, "include")) {
+      include_files(*each, depth + 1, so_far, problems);
+      each = each->NextSiblingElement();
+      continue;
+    }
+    Tag tag(*each, problems);
+    const std::string name = tag.text("file");
+    try {
+      std::string place;
+      const std::string text = read_beside(problems.file(), name, place, problems.folder());
+      so_far.bytes += text.size();
+      if (!so_far.files.insert(place).second) throw SurfaceError("is included twice");
+      if (so_far.bytes > kLargestPart)
+        throw SurfaceError("is one of files that have more than 64 MiB together");
+      Problems of_file(name, problems.folder());
+      const Document other(text, of_file);
+      tinyxml2::XMLNode* last = each;
+      for (const Node* part = other.root().FirstChildElement(); part != nullptr;
+           part = part->NextSiblingElement())
+        last = parent.InsertAfterChild(last, part->DeepClone(&xml_));
+    } catch (const SurfaceError& e) {
+      tag.wrong("file", e.what());
+    }
+    Node* const included = each;
+    each = each->NextSiblingElement();
+    parent.DeleteChild(included);
+  }
 }
 
 std::string path(const Node& node) {

@@ -21,15 +21,19 @@ constexpr std::size_t kMostAttributes = 100;
 /// Collects what is wrong in a file, each with its line.
 class Problems : public files::Report {
  public:
-  explicit Problems(std::string file) : file_(std::move(file)) {}
+  /// `folder`: files that `file` names are in it or below; empty: in that of `file`.
+  explicit Problems(std::string file, std::string folder = {})
+      : file_(std::move(file)), folder_(std::move(folder)) {}
   const std::string& file() const { return file_; }
-  void add(int line, std::string field, std::string value, std::string allowed) {
+  const std::string& folder() const { return folder_; }
+  /// `line` 0: in a file that is included.
+  void add(int line, std::string field, std::string value, const std::string& allowed) {
     Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
-                std::move(allowed));
+                line > 0 ? allowed : allowed + " (in a file that it includes)");
   }
 
  private:
-  std::string file_;
+  std::string file_, folder_;
 };
 
 /// A document whose text is UTF-8 with at most 64 MiB, 100 elements inside each other, no DOCTYPE
@@ -38,8 +42,14 @@ class Document {
  public:
   Document(std::string_view text, Problems& problems);
   const Node& root() const { return *xml_.RootElement(); }
+  /// Puts what is in the files of all <include file="..."> in their place, where it has line 0.
+  /// Throws SceneError.
+  void include_files(Problems& problems);
 
  private:
+  struct Included;
+  void include_files(Node& parent, int depth, Included& so_far, Problems& problems);
+
   tinyxml2::XMLDocument xml_;
 };
 

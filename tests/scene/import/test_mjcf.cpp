@@ -331,7 +331,7 @@ TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with
   refused(world("<body><joint class='none'/><geom size='1'/></body>"), "no <default>");
   refused(world("<body name='a'/><body name='a'/>"), "another body");
   refused(world("<replicate count='9'/>"), "is not read");
-  refused(world("<include file='x'/>"), "is not read");
+  refused(world("<include file='x'/>"), "no such file");
   refused(world("", "<compiler coordinate='global'/>"), "must be local");
   refused(world("<body><joint/><geom size='1' quat='0 0 0 0'/></body>"), "quat");
   for (const char* sequence : {"pyZ", "x", "", "xyzx"})

@@ -307,6 +307,12 @@ TEST_CASE("links without mass: two hinges that cross are a universal joint, thre
   CHECK(scene.bodies.size() == 1);
 }
 
+TEST_CASE("a joint without limit moves freely, which is said") {
+  const import::Imported made = import_robot(two_links("revolute", ""), "robot.urdf", {});
+  CHECK_FALSE(parse_scene(made.toml, "r.toml").joints.front().limits);
+  CHECK(made.toml.find("joints without <limit>, which move freely: j") != std::string::npos);
+}
+
 TEST_CASE("a URDF that is wrong is refused with the line of the element") {
   const auto refused = [](const std::string& text, const std::string& words) {
     INFO(text);
@@ -328,7 +334,6 @@ TEST_CASE("a URDF that is wrong is refused with the line of the element") {
   std::string deep;
   for (int k = 0; k < 2000; ++k) deep += "<robot>";
   refused(deep, "elements inside each other");
-  refused(two_links("revolute", ""), "robot.urdf:4: joint \"j\": limit: is missing");
   refused(two_links("hinge", limit), "joint \"j\": type = \"hinge\": must be revolute");
   refused(two_links("revolute", "<limit lower='2' upper='1'/>"),
           "robot.urdf:5: joint \"j\": limit: lower");

@@ -17,11 +17,11 @@ namespace tether::scene {
 namespace {
 
 struct ImportArguments {
-  std::string file, out = "-", base;
+  std::string file, out = "-", base, files;
   std::vector<std::string> joints, held;
-  std::optional<double> ground, friction;
+  std::optional<double> ground, friction, density;
   double height = 0, end = 1;
-  bool no_joint_laws = false, mend = false, strict = false, force = false;
+  bool no_joint_laws = false, mend = false, hulls = false, strict = false, force = false;
 };
 
 /// NAME=VALUE; a name may have an equals sign, a value has none.
@@ -54,6 +54,9 @@ out.ground = a.ground;
 out.friction = a.friction;
 out.joint_laws = !a.no_joint_laws;
 out.mend = a.mend;
+out.density = a.density;
+out.hulls = a.hulls;
+out.files = a.files;
 out.end = a.end;
 return out;
 }  // namespace
@@ -93,6 +96,16 @@ void add_import_command(CLI::App& app, int* status) {
                       "Add ground at this height, m, that the robot touches");
   command->add_option("--friction", a->friction, "Of all contacts [MJCF: as it says; URDF: 1]");
   command->add_flag("--mend", a->mend, "Change inertias that no body has to the nearest ones");
+  command->add_flag("--hulls", a->hulls,
+                    "Meshes of a URDF touch as their convex hulls, not as convex parts");
+  command
+      ->add_option("--density", a->density,
+                   "Links of a URDF without <inertial> weigh as their shapes, kg/m^3")
+      ->check(positive_number());
+  command
+      ->add_option("--files", a->files,
+                   "Folder that meshes and included files lie below [that of the robot]")
+      ->check(CLI::ExistingDirectory);
   command->add_option("--end", a->end, "End of the run, s [1]")->check(positive_number());
   command->add_flag("--strict", a->strict, "Exit code 1 if anything was left out or changed");
   command->add_flag("--force", a->force, "Replace a file that is there");
