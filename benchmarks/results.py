@@ -56,6 +56,10 @@ COMMANDS = {
     "contact_collection": ("Contact problems in files", "Time to a residual, beside the solvers of Siconos.",
                            f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA --law coulomb --time-limit 1"
                            " | grep -E 'natural_map  |^tolerance|^unsolved'"),
+    "contact_proofs": ("Exact solutions proven near those of the contact solver",
+                       "Radius: largest distance of the exact solution, over the largest impulse. Change: of b, over its largest entry, so "
+                       "that the solution is exact; 0: the problem itself. Seconds: program, solve and proof.",
+                       f"python3 benchmarks/contact/proofs.py {TETHER} $TETHER_CONTACT_DATA tests/contact/collection"),
     "contact_scale": ("A sweep over many contacts", "Nanoseconds of a contact and sweep by size and threads.",
                       f"{BUILT}/contact/contact_scale --spheres 1 --threads 2 --most 100000"),
     "islands": ("Large islands: residual against time",

@@ -67,6 +67,15 @@ py::dict residuals(const tc::Problem& problem, const std::string& law, const Arr
                   "fixed_point"_a = r.fixed_point, "natural_map"_a = r.natural_map);
 }
 
+py::dict prove(const tc::Problem& problem, const Array& impulses, double allowed) {
+  const tc::Proof p = tc::prove(problem, vector("impulses", impulses), allowed);
+  using namespace py::literals;
+  return py::dict("status"_a = std::string(name(p.status)), "radius"_a = p.radius,
+                  "relative_radius"_a = p.relative_radius, "change"_a = p.change,
+                  "relative_change"_a = p.relative_change, "regimes"_a = words_of(p.regimes),
+                  "contact"_a = p.contact, "reason"_a = p.reason);
+}
+
 tc::Solution solve(const tc::Problem& problem, const std::string& law, double tolerance,
                    const py::object& start, double max_work, bool strict) {
   tc::Options options;
@@ -133,6 +142,12 @@ w = A x - b. Raises ValueError on sizes that do not match and values that are no
           },
           "impulses"_a, "law"_a = "maximum_dissipation",
           "How far any impulses are from a solution: velocities in m/s; fixed_point has no unit.")
+      .def("prove", &prove, "impulses"_a, py::kw_only(), "allowed"_a = 1e-9,
+           R"(Proof in interval arithmetic that an exact solution of Coulomb's law is near.
+
+status: proven (every |x*_i - x_i| <= radius, N s), proven_nearby (the same, x* solves a problem
+whose b differs by at most change in m/s; relative_change, at most `allowed`, is over the largest b
+of its island) or not_proven. contact and reason: what prevents more.)")
       .def("derivative", &derivative, "solution"_a, "law"_a = "maximum_dissipation", py::kw_only(),
            "tolerance"_a = 1e-5, "kink"_a = 1e-6,
            R"(The derivative of a Solution of this problem under `law`: a Derivative.

@@ -29,6 +29,13 @@ class OneContact(unittest.TestCase):
         np.testing.assert_allclose(s.impulses, [0.5, 0.06, -0.08], atol=1e-12)
         self.assertLess(s.error, 1e-12)
 
+    def test_an_exact_solution_is_proven_within_the_error(self):
+        p = contact.Problem(np.eye(3), [10, 6, 8], [0.5])
+        proof = p.prove([10, 3, 4.5], allowed=0)
+        self.assertEqual((proof["status"], proof["regimes"]), ("proven", ["sliding"]))
+        self.assertAlmostEqual(proof["radius"], 0.5, 12)  # x = (10, 3, 4)
+        self.assertEqual(p.prove([10, np.nan, 4])["status"], "not_proven")
+
     def test_in_the_plane(self):
         p = contact.Problem([[2.0, 0], [0, 4]], [1, 3], [0.2])
         self.assertEqual((p.dimension, p.contacts), (2, 1))

@@ -97,6 +97,25 @@ void solve_in_other_orders(const Paths& paths) {
   }
 }
 
+// The share of the problems for which an exact solution is proven, of themselves or of one nearby.
+double proven(const Paths& paths, double tolerance) {
+  int count = 0;
+  for (const std::string& path : paths) {
+    const Problem p = read_problem(path);
+    Options o;
+    o.law = Law::coulomb;
+    o.tolerance = tolerance;
+    const Proof proof = prove(p, Solver(o).solve(p).impulses);
+    UNSCOPED_INFO(path << ": " << name(proof.status) << ", radius " << proof.relative_radius
+                       << ", change " << proof.relative_change << ", " << proof.reason);
+    if (proof.status == ProofStatus::not_proven) continue;
+    ++count;
+    CHECK(std::isfinite(proof.radius));
+    CHECK(proof.relative_change <= (proof.status == ProofStatus::proven ? 0 : 1e-9));
+  }
+  return static_cast<double>(count) / static_cast<double>(paths.size());
+}
+
 // How many problems had a derivative to compare, and how many of these one of impulses.
 std::array<int, 2> compare_derivatives(const Paths& paths) {
   std::array<int, 2> out = {0, 0};
@@ -133,6 +152,10 @@ TEST_CASE("own collection: derivatives against differences, wherever strictly re
 
 TEST_CASE("own collection: other orders and tangents") { solve_in_other_orders(own()); }
 
+TEST_CASE("own collection: exact solutions are proven near every solution") {
+  for (double tolerance : {1e-6, 1e-9}) CHECK(proven(own(), tolerance) == 1);
+}
+
 TEST_CASE("own collection: both formats hold what is written again") {
   for (const std::string& path : own()) {
     const Problem p = read_problem(path);
@@ -152,6 +175,12 @@ TEST_CASE("the collection under coulomb") {
   const Paths all = others();
   NEEDS(all);
   solve_under_coulomb(all);
+}
+
+TEST_CASE("the collection: exact solutions are proven near at least nine solutions of ten") {
+  const Paths all = others();
+  NEEDS(all);
+  for (double tolerance : {1e-6, 1e-9}) CHECK(proven(all, tolerance) >= 0.9);
 }
 
 TEST_CASE("the collection: derivatives against differences, wherever strictly regular") {

@@ -9,6 +9,7 @@
 #include <tether/contact/joints.hpp>
 #include <tether/contact/one_contact.hpp>
 #include <tether/contact/problem.hpp>
+#include <tether/contact/proof.hpp>
 #include <tether/contact/shapes.hpp>
 #include <tether/contact/solver.hpp>
 #include <tether/contact/stepping.hpp>

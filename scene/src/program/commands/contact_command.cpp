@@ -14,7 +14,7 @@ using namespace tether::contact;
 struct ContactArguments {
   std::vector<std::string> files;
   Options options;
-  bool csv = false;
+  bool csv = false, prove = false;
 };
 
 std::map<std::string, Law> laws_by_name() {
@@ -44,6 +44,24 @@ void add_choice(CLI::App& command, const char* option, const char* what,
       ->default_str(now);
 }
 
+// The proof of one solution, as columns or as lines.
+void print_proof(const Proof& proof, bool csv) {
+  if (csv) {
+    std::printf(",%s,%.3e,%.3e,%.3e,%.3e", name(proof.status), proof.radius, proof.relative_radius,
+                proof.change, proof.relative_change);
+    return;
+  }
+  std::printf("  %s", name(proof.status));
+  if (proof.status != ProofStatus::not_proven)
+    std::printf(": an exact solution within %.3e N s, %.3e of the largest impulse", proof.radius,
+                proof.relative_radius);
+  if (proof.status == ProofStatus::proven_nearby)
+    std::printf(", for b changed by at most %.3e m/s, %.3e of the largest", proof.change,
+                proof.relative_change);
+  std::printf("\n");
+  if (!proof.reason.empty()) std::printf("  contact %d: %s\n", proof.contact, proof.reason.c_str());
+}
+
 // Solves files that hold more than contacts: joints, masses, rolling friction.
 Status run_cones(const ContactArguments& arguments, const std::string& file,
                  const ConeProblem& problem) {
@@ -54,9 +72,10 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
   const double energy_change = 0.5 * s.impulses.dot(s.velocities - problem.b());
   if (arguments.csv) {
     // The other measures are of contacts of one kind: empty.
-    std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,,,,,%.3e,%.3e,%.3e,\n", table_field(file).c_str(),
+    std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,,,,,%.3e,%.3e,%.3e,%s\n", table_field(file).c_str(),
                 blocks, name(o.law), o.tolerance, name(s.status), s.error, s.counts.sweeps,
-                s.counts.factorisations, dissipation, energy_change, s.error);
+                s.counts.factorisations, dissipation, energy_change, s.error,
+                arguments.prove ? ",not_proven,,,," : "");
     return s.status;
   }
   std::printf("%s: %d cones of %d rows, %s\n", on_terminal(file).c_str(), blocks, problem.rows(),
@@ -65,6 +84,7 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
               s.counts.sweeps, s.counts.factorisations);
   std::printf("  energy change %.9e\n", energy_change);
   if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
+  if (arguments.prove) std::printf("  not_proven: proofs are of friction contacts alone\n");
   return s.status;
 }
 
@@ -79,13 +99,34 @@ std::unique_ptr<ConeProblem> as_cones(const std::string& file) {
   }
 }
 
+// One solved problem in words.
+void print(const std::string& file, const contact::Problem& problem, Law law, const Solution& s,
+           const Residuals& r) {
+  int count[3] = {0, 0, 0};
+  for (Regime regime : s.regimes) ++count[static_cast<int>(regime)];
+  std::printf("%s: %d contacts, %s\n", on_terminal(file).c_str(), problem.contacts(), name(law));
+  std::printf("  %s, error %.3e; %d sweeps, %d factorisations\n", name(s.status), s.error,
+              s.counts.sweeps, s.counts.factorisations);
+  std::printf("  separating %d, sticking %d, sliding %d\n", count[0], count[1], count[2]);
+  std::printf("  fixed point %.3e, natural map %.3e, Signorini %.3e, cone %.3e, alignment %.3e\n",
+              r.fixed_point, r.natural_map, r.signorini, r.cone, r.alignment);
+  std::printf("  energy change %.9e\n", r.energy_change);
+  if (!s.replaced.empty()) {
+    std::printf("  the Coulomb rule replaces the law at %zu contacts:", s.replaced.size());
+    for (int i : s.replaced) std::printf(" %d", i);
+    std::printf("\n");
+  }
+  if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
+}
+
 // 0: all solved, 1: some not solved, 2: some file or option is wrong.
 int run(const ContactArguments& arguments) {
   int status = 0;
   if (arguments.csv) {
     std::printf(
         "file,contacts,law,tolerance,status,error,sweeps,factorisations,replaced,signorini,cone,"
-        "alignment,dissipation,energy_change,fixed_point,natural_map\n");
+        "alignment,dissipation,energy_change,fixed_point,natural_map%s\n",
+        arguments.prove ? ",proof,radius,relative_radius,change,relative_change" : "");
   }
   for (const std::string& file : arguments.files) {
     try {
@@ -103,30 +144,17 @@ int run(const ContactArguments& arguments) {
       const Residuals r = evaluate(problem, o.law, s.impulses);
       if (s.status != Status::solved && status == 0) status = 1;
       if (arguments.csv) {
-        std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e\n",
+        std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e",
                     table_field(file).c_str(), problem.contacts(), name(o.law), o.tolerance,
                     name(s.status), s.error, s.counts.sweeps, s.counts.factorisations,
                     s.replaced.size(), r.signorini, r.cone, r.alignment, r.dissipation,
                     r.energy_change, r.fixed_point, r.natural_map);
+        if (arguments.prove) print_proof(prove(problem, s.impulses), true);
+        std::printf("\n");
         continue;
       }
-      int count[3] = {0, 0, 0};
-      for (Regime regime : s.regimes) ++count[static_cast<int>(regime)];
-      std::printf("%s: %d contacts, %s\n", on_terminal(file).c_str(), problem.contacts(),
-                  name(o.law));
-      std::printf("  %s, error %.3e; %d sweeps, %d factorisations\n", name(s.status), s.error,
-                  s.counts.sweeps, s.counts.factorisations);
-      std::printf("  separating %d, sticking %d, sliding %d\n", count[0], count[1], count[2]);
-      std::printf(
-          "  fixed point %.3e, natural map %.3e, Signorini %.3e, cone %.3e, alignment %.3e\n",
-          r.fixed_point, r.natural_map, r.signorini, r.cone, r.alignment);
-      std::printf("  energy change %.9e\n", r.energy_change);
-      if (!s.replaced.empty()) {
-        std::printf("  the Coulomb rule replaces the law at %zu contacts:", s.replaced.size());
-        for (int i : s.replaced) std::printf(" %d", i);
-        std::printf("\n");
-      }
-      if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
+      print(file, problem, o.law, s, r);
+      if (arguments.prove) print_proof(prove(problem, s.impulses), false);
     } catch (const std::exception& e) {
       std::fprintf(stderr, "tether contact: %s\n", on_terminal(e.what()).c_str());
       status = 2;
@@ -148,8 +176,14 @@ void add_contact_command(CLI::App& app, int* status) {
   add_choice(*command, "--measure", "What is compared with the tolerance", kMeasures,
              arguments->options.measure);
   command->add_flag("--strict", arguments->options.strict, "Never replace the law");
+  command->add_flag("--prove", arguments->prove,
+                    "Prove that an exact solution is near; needs --law coulomb");
   command->add_flag("--csv", arguments->csv, "One line a file");
-  command->callback([arguments, status] { *status = run(*arguments); });
+  command->callback([arguments, status] {
+    if (arguments->prove && arguments->options.law != Law::coulomb)
+      throw CLI::ValidationError("--prove", "needs --law coulomb");
+    *status = run(*arguments);
+  });
 }
 
 }  // namespace tether::scene

@@ -1,0 +1,164 @@
+// Tether: proof that an exact solution lies near given impulses. SPDX-License-Identifier:
+// BSD-3-Clause
+#include <tether/contact/proof.hpp>
+
+#include <cfenv>
+#include <cfloat>
+#include <cmath>
+#include <stdexcept>
+#include <tether/contact/solver.hpp>
+
+#include "problem/refuse.hpp"
+#include "proof/regime_proof.hpp"
+
+namespace tether::contact {
+namespace detail {
+namespace {
+
+using linalg::VectorX;
+
+Proof without_proof(int contact, const std::string& reason) {
+  Proof out;
+  out.radius = out.relative_radius = out.change = out.relative_change = kInfinity;
+  out.contact = contact;
+  out.reason = reason;
+  return out;
+}
+
+double in_units(double value, int exponent) {
+  return std::nextafter(std::ldexp(value, exponent), kInfinity);
+}
+
+// The largest distance of a contact of the box from the given impulses.
+double distance(const ProofIsland& island, const VectorX& given, const Box& box) {
+  double out = 0;
+  for (int i = 0; i < island.contacts(); ++i) {
+    Interval sum;
+    for (int r = island.dimension * i; r < island.dimension * (i + 1); ++r)
+      sum = sum + square(box[r] - std::ldexp(given[r], -island.impulse[at(i)]));
+    out = std::max(out, in_units(root(sum).hi, island.impulse[at(i)]));
+  }
+  return out;
+}
+
+// From the candidate near `start`; the radius is measured from `given`.
+Proof prove_from(const Problem& problem, const VectorX& start, const VectorX& given,
+                 double allowed) {
+  const ProofIsland island = proof_island(problem, start);
+  const Candidate candidate = polish(island);
+  Proof out;
+  out.regimes = candidate.regimes;
+  out.reason = "the equations of its island depend on each other, or nearly so";
+  out.contact = 0;
+  if (const std::optional<Box> box = enclose_root(island, candidate)) {
+    out.contact = first_doubt(island, candidate.regimes, *box);
+    if (out.contact < 0) {
+      out.status = ProofStatus::proven;
+      out.reason.clear();
+      out.radius = distance(island, given, *box);
+      return out;
+    }
+    out.reason = "it is at the brink of another regime";
+  }
+  const NearbySolution near = nearby_solution(island, candidate);
+  Eigen::Index worst = 0;
+  const double largest = near.change.maxCoeff<Eigen::PropagateNaN>(&worst);
+  if (largest > 0)
+    out.relative_change = std::nextafter(largest / island.b.lpNorm<Eigen::Infinity>(), kInfinity);
+  if (!(out.relative_change <= allowed))
+    return without_proof(static_cast<int>(worst) / island.dimension,
+                         "b would have to change by " + shown(out.relative_change) +
+                             " of its island's largest b; allowed is " + shown(allowed));
+  out.status = ProofStatus::proven_nearby;
+  out.regimes = near.regimes;
+  out.radius = distance(island, given, near.box);
+  for (Eigen::Index r = 0; r < near.change.size(); ++r) {
+    const int i = static_cast<int>(r) / island.dimension;
+    out.change = std::max(out.change, in_units(near.change[r], island.velocity[at(i)]));
+  }
+  return out;
+}
+
+// From the impulses themselves: the nearest solution; else from those of a Solver.
+Proof prove_island(const Problem& problem, const VectorX& given, double allowed) {
+  try {
+    const Proof out = prove_from(problem, given, given, allowed);
+    if (out.status != ProofStatus::not_proven) return out;
+    Options options;
+    options.law = Law::coulomb;
+    options.tolerance = 1e-13;
+    return prove_from(problem, Solver(options).solve(problem, given).impulses, given, allowed);
+  } catch (const std::range_error& e) {
+    return without_proof(0, e.what());
+  }
+}
+
+// The weaker of two proofs decides; `contacts` are those of `part`.
+void join(Proof& whole, const Proof& part, const std::vector<int>& contacts) {
+  if (part.status < whole.status) {
+    whole.status = part.status;
+    whole.contact = contacts[at(part.contact)];
+    whole.reason = part.reason;
+  }
+  whole.radius = std::max(whole.radius, part.radius);
+  whole.change = std::max(whole.change, part.change);
+  whole.relative_change = std::max(whole.relative_change, part.relative_change);
+  for (std::size_t k = 0; k < part.regimes.size(); ++k)
+    whole.regimes[at(contacts[k])] = part.regimes[k];
+}
+
+bool rounds_to_nearest() {
+  return std::numeric_limits<double>::is_iec559 && FLT_EVAL_METHOD == 0 &&
+         std::fegetround() == FE_TONEAREST;
+}
+
+}  // namespace
+}  // namespace detail
+
+const char* name(ProofStatus status) {
+  switch (status) {
+    case ProofStatus::proven:
+      return "proven";
+    case ProofStatus::proven_nearby:
+      return "proven_nearby";
+    case ProofStatus::not_proven:
+      break;
+  }
+  return "not_proven";
+}
+
+Proof prove(const Problem& problem, const linalg::VectorView& impulses, double allowed) {
+  using linalg::at;
+  const int d = problem.dimension(), n = problem.contacts();
+  if (impulses.size() != d * n)
+    detail::refuse_size("impulses", impulses.size(), d * n, std::to_string(d) + " a contact");
+  detail::require(allowed >= 0, "allowed", allowed, "must be >= 0");
+  for (int r = 0; r < d * n; ++r)
+    if (!std::isfinite(impulses[r]))
+      return detail::without_proof(r / d, "an impulse is " + detail::shown(impulses[r]));
+  if (!detail::rounds_to_nearest())
+    return detail::without_proof(-1, "doubles are not rounded to nearest");
+  Proof out;
+  out.status = ProofStatus::proven;
+  out.regimes.resize(at(n));
+  double largest = 0;
+  std::vector<std::vector<int>> islands;
+  for (int i = 0; i < n; ++i) {
+    const std::size_t island = at(problem.islands()[at(i)]);
+    if (island >= islands.size()) islands.resize(island + 1);
+    islands[island].push_back(i);
+    largest = std::max(largest, impulses.segment(d * i, d).stableNorm());
+  }
+  for (const std::vector<int>& contacts : islands) {
+    linalg::VectorX given(d * static_cast<int>(contacts.size()));
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      given.segment(d * static_cast<int>(k), d) = impulses.segment(d * contacts[k], d);
+    detail::join(out, detail::prove_island(problem.part(contacts), given, allowed), contacts);
+  }
+  if (out.status == ProofStatus::not_proven) out.regimes.clear();
+  out.relative_radius =
+      out.radius > 0 ? std::nextafter(out.radius / largest, detail::kInfinity) : 0;
+  return out;
+}
+
+}  // namespace tether::contact

@@ -1,0 +1,113 @@
+// Tether: Coulomb's law in fixed regimes as a square system. SPDX-License-Identifier: BSD-3-Clause
+#include "proof/regime_equations.hpp"
+
+#include <cmath>
+
+namespace tether::contact::detail {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+VectorXd without_separating(VectorXd x, const std::vector<Regime>& regimes, int dimension) {
+  for (std::size_t i = 0; i < regimes.size(); ++i)
+    if (regimes[i] == Regime::separating)
+      x.segment(dimension * static_cast<Index>(i), dimension).setZero();
+  return x;
+}
+
+}  // namespace
+
+RegimeEquations::RegimeEquations(const ProofIsland& island, const std::vector<Regime>& regimes,
+                                 const VectorXd& x)
+    : island_(island),
+      regimes_(regimes),
+      x_(without_separating(x, regimes, island.dimension)),
+      velocities_(island, {x_, VectorXd::Zero(x.size())}),
+      c_(VectorXd::Ones(island.contacts())) {
+  const int d = island.dimension;
+  for (int i = 0; i < island.contacts(); ++i)
+    if (regimes[at(i)] != Regime::separating) touching_.push_back(i);
+  const int m = static_cast<int>(touching_.size());
+  F_.resize(at(d * m));
+  J_.resize(d * m, d * m);
+  for (int p = 0; p < m; ++p) {
+    const int i = touching_[at(p)];
+    for (int r = 0; r < d; ++r) F_[at(d * p + r)] = velocities_.w[at(d * i + r)];
+    for (int q = 0; q < m; ++q)
+      J_.block(d * p, d * q, d, d) = island.A.block(d * i, d * touching_[at(q)], d, d);
+    if (regimes[at(i)] == Regime::sliding) slide(d * p, i);
+  }
+}
+
+void RegimeEquations::slide(int row, int contact) {
+  const int d = island_.dimension, from = d * contact;
+  const double mu = island_.mu[contact], normal = x_[from], *t = &x_[from + 1];
+  if (mu == 0 || d == 2) {
+    const double slope = t[0] < 0 ? -mu : mu;
+    for (int r = 1; r < d; ++r) {
+      J_.row(row + r).setZero();
+      J_(row + r, row) = -slope;
+      J_(row + r, row + r) = 1;
+      F_[at(row + r)] = Interval(t[r - 1]) - Interval(slope) * normal;
+    }
+    return;
+  }
+  const double c = c_[contact] = 1 / std::max(std::hypot(t[0], t[1]), kUnit);
+  const Interval &w1 = velocities_.w[at(from + 1)], &w2 = velocities_.w[at(from + 2)];
+  J_.row(row + 1) = ((t[0] * J_.row(row + 2) - t[1] * J_.row(row + 1)) * c).eval();
+  J_(row + 1, row + 1) += c * w2.middle();
+  J_(row + 1, row + 2) -= c * w1.middle();
+  J_.row(row + 2).setZero();
+  J_.block(row + 2, row, 1, 3) << -c * (mu * mu * normal), c * t[0], c * t[1];
+  F_[at(row + 1)] = Interval(c) * (Interval(t[0]) * w2 - Interval(t[1]) * w1);
+  F_[at(row + 2)] = Interval(c / 2) * (square(t[0]) + square(t[1]) - square(Interval(mu) * normal));
+}
+
+VectorXd RegimeEquations::middle() const {
+  VectorXd out(static_cast<Index>(F_.size()));
+  for (Index k = 0; k < out.size(); ++k) out[k] = F_[static_cast<std::size_t>(k)].middle();
+  return out;
+}
+
+VectorXd RegimeEquations::radius() const {
+  VectorXd out(static_cast<Index>(F_.size()));
+  for (Index k = 0; k < out.size(); ++k) out[k] = F_[static_cast<std::size_t>(k)].radius();
+  return out;
+}
+
+VectorXd RegimeEquations::remainder(const VectorXd& rho, const VectorXd& spread) const {
+  VectorXd out = VectorXd::Zero(rho.size());
+  if (island_.dimension == 2) return out;  // F is linear
+  const double rounding = 8 * kUnit;       // an entry of J has at most five roundings
+  for (std::size_t p = 0; p < touching_.size(); ++p) {
+    const int i = touching_[p];
+    const double mu = island_.mu[i], c = c_[i];
+    if (regimes_[at(i)] != Regime::sliding || mu == 0) continue;
+    const Index row = 3 * static_cast<Index>(p);
+    const double *e = &rho[row], *a = &spread[3 * i];
+    const Eigen::Vector3d x = x_.segment(3 * i, 3).cwiseAbs();
+    const Interval &w1 = velocities_.w[at(3 * i + 1)], &w2 = velocities_.w[at(3 * i + 2)];
+    const double entries =
+        x[1] * a[2] + x[2] * a[1] + e[1] * w2.magnitude() + e[2] * w1.magnitude();
+    const double middles = e[1] * w2.radius() + e[2] * w1.radius();
+    const double quadratic = e[1] * a[2] + e[2] * a[1];
+    const double cone = e[1] * x[1] + e[2] * x[2] + mu * mu * e[0] * x[0];
+    const double square = (e[1] * e[1] + e[2] * e[2] + mu * mu * e[0] * e[0]) / 2;
+    const double lost = static_cast<double>(rho.size()) * kTiny * (1 + c) * (1 + rho.maxCoeff());
+    out[row + 1] = above(c * (rounding * entries + middles + quadratic), 16) + lost;
+    out[row + 2] = above(c * (rounding * cone + square), 16) + lost;
+  }
+  return out;
+}
+
+VectorXd RegimeEquations::scattered(const VectorXd& unknowns) const {
+  const int d = island_.dimension;
+  VectorXd out = VectorXd::Zero(x_.size());
+  for (std::size_t p = 0; p < touching_.size(); ++p)
+    out.segment(d * touching_[p], d) = unknowns.segment(d * static_cast<Index>(p), d);
+  return out;
+}
+
+}  // namespace tether::contact::detail

@@ -1,0 +1,453 @@
+// Tether: proofs of exact solutions. Oracles: problems of whole numbers whose solution is known
+// exactly, and rational arithmetic. SPDX-License-Identifier: BSD-3-Clause
+#include <boost/multiprecision/cpp_int.hpp>
+#include <cfenv>
+#include <cmath>
+#include <tether/contact.hpp>
+
+#include "assemblies.hpp"
+#include "packing.hpp"
+#include "proof/regime_equations.hpp"
+#include "proof/regime_proof.hpp"
+#include "support/catch.hpp"
+
+using namespace tether::contact;
+using detail::at;
+using detail::Interval;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+using Exact = boost::multiprecision::cpp_rational;
+
+bool contains(Interval interval, const Exact& x) {
+  return (std::isinf(interval.lo) || Exact(interval.lo) <= x) &&
+         (std::isinf(interval.hi) || x <= Exact(interval.hi));
+}
+
+// A number of any size and sign; often 0, a power of two or next to one.
+double anything(random::Generator& g, int exponent) {
+  const double x = std::ldexp(g.uniform(-1, 1), static_cast<int>(g.uniform(-exponent, exponent)));
+  const double kind = g.uniform(0, 10);
+  if (kind < 1) return 0;
+  if (kind < 2) return std::copysign(std::ldexp(1.0, std::ilogb(x)), x);
+  if (kind < 3) return std::nextafter(std::ldexp(1.0, std::ilogb(x)), 0);
+  return x;
+}
+
+// Whole numbers that solve Coulomb's law exactly: b = A x - w, every contact in a chosen regime.
+struct Known {
+  Problem problem;
+  VectorXd x;
+  std::vector<Regime> regimes;
+};
+
+// At mu = 1/2, x = (10 k, 6 k, 8 k) / 2 lies on the cone.
+Known known(random::Generator& g, int contacts) {
+  const auto whole = [&g](int lo, int hi) { return std::floor(g.uniform(lo, hi + 1)); };
+  const int rows = 3 * contacts;
+  MatrixXd J(rows, rows);
+  for (double& entry : J.reshaped()) entry = whole(-2, 2);
+  const MatrixXd A = J * J.transpose() + 4 * rows * MatrixXd::Identity(rows, rows);
+  Known out{{}, VectorXd::Zero(rows), {}};
+  VectorXd w = VectorXd::Zero(rows);
+  for (int i = 0; i < contacts; ++i) {
+    const auto regime = static_cast<Regime>(static_cast<int>(whole(0, 2)));
+    const double k = whole(1, 9), s = whole(1, 9);
+    out.regimes.push_back(regime);
+    if (regime == Regime::separating) w.segment(3 * i, 3) << k, whole(-9, 9), whole(-9, 9);
+    if (regime == Regime::sticking) out.x.segment(3 * i, 3) << 4 * k, whole(-1, 1), whole(-1, 1);
+    if (regime == Regime::sliding) {
+      out.x.segment(3 * i, 3) << 10 * k, 3 * k, -4 * k;
+      w.segment(3 * i, 3) << 0, -3 * s, 4 * s;
+    }
+  }
+  out.problem = Problem::dense(A, A * out.x - w, VectorXd::Constant(contacts, 0.5));
+  return out;
+}
+
+double distance(const VectorXd& x, const VectorXd& y) {
+  double out = 0;
+  for (int i = 0; i < x.size(); i += 3) out = std::max(out, (x - y).segment(i, 3).norm());
+  return out;
+}
+
+Solution solved(const Problem& problem, double tolerance) {
+  Options o;
+  o.law = Law::coulomb;
+  o.tolerance = tolerance;
+  return Solver(o).solve(problem);
+}
+
+// One contact without coupling, mu = 1/2.
+Problem one(double bn, double b1, double b2) {
+  return Problem::dense(MatrixXd::Identity(3, 3), Eigen::Vector3d(bn, b1, b2),
+                        VectorXd::Constant(1, 0.5));
+}
+
+}  // namespace
+
+TEST_CASE("intervals contain exact results") {
+  random::Generator g(1);
+  for (int exponent : {2, 60, 500, 1070}) {
+    for (int k = 0; k < 5000; ++k) {
+      const double a = anything(g, exponent), b = anything(g, exponent), c = anything(g, exponent);
+      if (!std::isfinite(a) || !std::isfinite(b) || !std::isfinite(c)) continue;
+      const Exact x(a), y(b), z(c);
+      INFO(a << " " << b << " " << c);
+      CHECK(contains(Interval(a) + b, x + y));
+      CHECK(contains(Interval(a) - b, x - y));
+      CHECK(contains(Interval(a) * b, x * y));
+      CHECK(contains((Interval(a) + b) * c, (x + y) * z));
+      CHECK(contains((Interval(a) - b) * (Interval(c) - a), (x - y) * (z - x)));
+      CHECK(contains(square(Interval(a) + b), (x + y) * (x + y)));
+      if (b > 0) CHECK(contains((Interval(a) * c) / b, x * z / y));
+      const Interval r = root(square(Interval(a)));  // |a|
+      CHECK((r.lo <= std::abs(a) && std::abs(a) <= r.hi));
+    }
+  }
+}
+
+TEST_CASE("intervals: what is no number is any number") {
+  const double huge = 1e300, none = std::nan("");
+  for (const Interval& any : {Interval(huge) * huge - Interval(huge) * huge,
+                              Interval(1) / Interval(-1, 1), Interval::around(none, 1),
+                              Interval::around(1, none), Interval::around(0, detail::kInfinity)})
+    CHECK((any.lo <= -huge && any.hi >= huge));
+}
+
+TEST_CASE("long sums contain the exact sum, also of terms that cancel") {
+  random::Generator g(2);
+  for (int exponent : {1, 30, 400}) {
+    for (int k = 0; k < 300; ++k) {
+      detail::LongSum sum;
+      Exact exact = 0, size = 0;
+      const auto add = [&](double a, double x) {
+        sum.add(a, x);
+        exact += Exact(a) * Exact(x);
+        size += abs(Exact(a) * Exact(x));
+      };
+      const int terms = 1 + static_cast<int>(g.uniform(0, 60));
+      for (int t = 0; t < terms; ++t) {
+        const double a = anything(g, exponent), x = anything(g, exponent);
+        add(a, x);
+        if (t % 3 == 0) add(-a, std::nextafter(x, 1));
+      }
+      const Interval value = sum.value();
+      INFO(value.lo << " " << value.hi);
+      CHECK(contains(value, exact));
+      CHECK(Exact(sum.size()) >= size);
+      const double width = value.hi - value.lo;
+      CHECK(width <= 1e-15 * std::abs(value.middle()) + 1e-25 * sum.size() + 1e-300);
+    }
+  }
+}
+
+TEST_CASE("one contact with a known solution, in each regime") {
+  struct Case {
+    Problem problem;
+    Eigen::Vector3d x;
+    Regime regime;
+  };
+  for (const Case& c : {Case{one(-1, 2, 3), {0, 0, 0}, Regime::separating},
+                        Case{one(4, 1, -1), {4, 1, -1}, Regime::sticking},
+                        Case{one(10, 6, 8), {10, 3, 4}, Regime::sliding}}) {
+    for (double error : {0.0, 1e-9, 1e-3, 0.4}) {
+      const Eigen::Vector3d given = c.x + error * Eigen::Vector3d(1, -1, 1) / std::sqrt(3.0);
+      const Proof p = prove(c.problem, given, 0);
+      INFO(name(c.regime) << ", " << error << ": " << p.reason);
+      CHECK(p.status == ProofStatus::proven);
+      CHECK(p.regimes == std::vector<Regime>{c.regime});
+      CHECK(p.radius >= (given - c.x).norm() * (1 - 1e-15));
+      CHECK(p.radius <= (given - c.x).norm() + 1e-14);
+      CHECK(p.contact == -1);
+      CHECK(p.change == 0);
+    }
+  }
+}
+
+TEST_CASE("one contact in the plane and one without friction") {
+  const Problem plane =
+      Problem::dense(MatrixXd::Identity(2, 2), Eigen::Vector2d(10, -8), VectorXd::Constant(1, 0.5));
+  const Proof slides = prove(plane, Eigen::Vector2d(10.25, -5));
+  CHECK(slides.status == ProofStatus::proven);
+  CHECK(slides.radius == Approx(0.25).epsilon(1e-12));
+  const Problem smooth =
+      Problem::dense(MatrixXd::Identity(3, 3), Eigen::Vector3d(10, 1, 1), VectorXd::Zero(1));
+  const Proof p = prove(smooth, Eigen::Vector3d(10, 0.5, 0));
+  CHECK(p.status == ProofStatus::proven);
+  CHECK(p.radius == Approx(0.5).epsilon(1e-12));
+}
+
+TEST_CASE("known solutions of coupled contacts lie within the radius") {
+  random::Generator g(3);
+  int proven = 0;
+  for (int k = 0; k < 300; ++k) {
+    const Known problem = known(g, 1 + k % 12);
+    for (double error : {0.0, 1e-10, 1e-6, 1e-3}) {
+      VectorXd given = problem.x;
+      for (double& x : given) x += error * g.normal();
+      const Proof p = prove(problem.problem, given, 0);
+      INFO(k << ", " << error << ": " << p.reason << ", contact " << p.contact);
+      CHECK(p.status == ProofStatus::proven);
+      CHECK(p.regimes == problem.regimes);
+      CHECK(p.radius >= distance(given, problem.x) * (1 - 1e-15));
+      CHECK(p.radius <= distance(given, problem.x) + 1e-12);
+      proven += p.status == ProofStatus::proven ? 1 : 0;
+    }
+  }
+  CHECK(proven == 1200);
+}
+
+TEST_CASE("wrong impulses get a radius that reaches the solution") {
+  random::Generator g(4);
+  for (int k = 0; k < 200; ++k) {
+    const Known problem = known(g, 2 + k % 6);
+    VectorXd given = problem.x;  // one contact in another regime, or all of it invented
+    const int i = k % static_cast<int>(problem.regimes.size());
+    if (problem.regimes[at(i)] == Regime::separating)
+      given.segment(3 * i, 3) << 5, 0.1, 0.1;
+    else
+      given.segment(3 * i, 3).setZero();
+    if (k % 5 == 0)
+      for (double& x : given) x = 10 * g.normal();
+    const Proof p = prove(problem.problem, given);
+    INFO(k << ": " << p.reason);
+    REQUIRE(p.status != ProofStatus::not_proven);
+    CHECK(p.radius >= distance(given, problem.x) * (1 - 1e-15));
+  }
+}
+
+TEST_CASE("a candidate with a wrong regime is not proven") {
+  random::Generator g(5);
+  int refused = 0, roots = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Known problem = known(g, 2 + k % 6);
+    const detail::ProofIsland island = detail::proof_island(problem.problem, problem.x);
+    detail::Candidate candidate{island.x, problem.regimes};
+    Regime& regime = candidate.regimes[at(k % static_cast<int>(problem.regimes.size()))];
+    regime = static_cast<Regime>((static_cast<int>(regime) + 1 + k % 2) % 3);
+    const std::optional<detail::Box> box = detail::enclose_root(island, candidate);
+    roots += box ? 1 : 0;
+    if (!box || detail::first_doubt(island, candidate.regimes, *box) >= 0) ++refused;
+    if (regime == Regime::separating) {  // x = 0 and w_n < 0: b would have to change
+      const detail::NearbySolution near = detail::nearby_solution(island, candidate);
+      CHECK(near.change.maxCoeff() > 1e-3);
+    }
+  }
+  CHECK(refused == 200);
+  CHECK(roots >= 50);  // the inequalities refuse these
+}
+
+TEST_CASE("the box holds the root from far candidates, or there is none") {
+  random::Generator g(6);
+  int boxes = 0;
+  for (int k = 0; k < 100; ++k) {
+    const Known problem = known(g, 1 + k % 8);
+    const detail::ProofIsland island = detail::proof_island(problem.problem, problem.x);
+    for (double error : {1e-12, 1e-8, 1e-4, 1e-2, 1e-1}) {
+      detail::Candidate candidate{island.x, problem.regimes};
+      for (double& x : candidate.x) x += error * g.normal();
+      const std::optional<detail::Box> box = detail::enclose_root(island, candidate);
+      if (!box) continue;
+      ++boxes;
+      for (int r = 0; r < island.x.size(); ++r) {
+        INFO(k << ", " << error << ", row " << r << ": " << box->radius[r]);
+        CHECK(std::abs(box->x[r] - island.x[r]) <= box->radius[r] * (1 + 1e-15));
+      }
+    }
+  }
+  CHECK(boxes >= 300);
+}
+
+TEST_CASE("remainder of the quadratic equations, against rational arithmetic") {
+  random::Generator g(7);
+  for (int k = 0; k < 100; ++k) {
+    const Known problem = known(g, 2);
+    const detail::ProofIsland island = detail::proof_island(problem.problem, problem.x);
+    const std::vector<Regime> slide(2, Regime::sliding);
+    VectorXd x(6), rho(6);
+    for (double& v : x) v = g.normal();
+    for (double& v : rho) v = std::ldexp(g.uniform(0, 1), -static_cast<int>(g.uniform(0, 50)));
+    const detail::RegimeEquations F(island, slide, x);
+    const VectorXd rest = F.remainder(rho, island.A.cwiseAbs() * rho * (1 + 1e-14));
+    VectorXd e(6);
+    for (int r = 0; r < 6; ++r)
+      e[r] = rho[r] * (k % 3 == 0 ? g.uniform(-1, 1) : g.normal() < 0 ? -1 : 1);
+    std::vector<Exact> at_x, moved;  // F by its definition
+    for (auto* values : {&at_x, &moved}) {
+      std::vector<Exact> y(6), w(6);
+      for (int r = 0; r < 6; ++r)
+        y[at(r)] = Exact(x[r]) + (values == &moved ? Exact(e[r]) : Exact(0));
+      for (int r = 0; r < 6; ++r) {
+        w[at(r)] = -Exact(island.b[r]);
+        for (int c = 0; c < 6; ++c) w[at(r)] += Exact(island.A(r, c)) * y[at(c)];
+      }
+      for (std::size_t i = 0; i < 6; i += 3) {
+        const Exact c(1 / std::hypot(x[static_cast<int>(i) + 1], x[static_cast<int>(i) + 2]));
+        values->push_back(w[i]);
+        values->push_back(c * (y[i + 1] * w[i + 2] - y[i + 2] * w[i + 1]));
+        values->push_back(c / 2 * (y[i + 1] * y[i + 1] + y[i + 2] * y[i + 2] - y[i] * y[i] / 4));
+      }
+    }
+    for (int r = 0; r < 6; ++r) {
+      Exact linear = 0;
+      for (int c = 0; c < 6; ++c) linear += Exact(F.J()(r, c)) * Exact(e[c]);
+      const Exact left = abs(moved[at(r)] - at_x[at(r)] - linear);
+      INFO(k << ", row " << r << ": " << static_cast<double>(left) << " of " << rest[r]);
+      CHECK(left <= Exact(rest[r]));
+      CHECK(abs(at_x[at(r)] - Exact(F.middle()[r])) <= Exact(F.radius()[r]));
+    }
+  }
+}
+
+TEST_CASE("at the brink of two regimes another b is named, or nothing is proven") {
+  MatrixXd A = MatrixXd::Identity(6, 6);
+  A(0, 3) = A(3, 0) = 0.5;  // the second contact touches without impulse, w = 0
+  VectorXd b(6), x = VectorXd::Zero(6);
+  b << 4, 1, 1, 2, 0, 0;
+  x.head(3) << 4, 1, 1;
+  const Problem touches = Problem::dense(A, b, VectorXd::Constant(2, 0.5));
+  const Problem on_the_cone = one(10, 3, 4);
+  for (const auto& [problem, at_brink] : {std::pair(touches, 1), std::pair(on_the_cone, 0)}) {
+    const VectorXd given = at_brink == 1 ? x : VectorXd(on_the_cone.b());
+    const Proof p = prove(problem, given);
+    INFO(p.reason);
+    CHECK(p.status == ProofStatus::proven_nearby);
+    CHECK(p.change <= 1e-14);
+    CHECK(p.contact == at_brink);
+    CHECK(prove(problem, given, 0).status == ProofStatus::not_proven);
+  }
+}
+
+TEST_CASE("without impulses w = -b is exact, and so is a grazing contact") {
+  for (const Problem& p : {one(0, 0, 0), one(0, 1, 0)}) {
+    const Proof q = prove(p, VectorXd::Zero(3), 0);
+    CHECK(q.status == ProofStatus::proven);
+    CHECK(q.radius <= 1e-100);
+  }
+}
+
+TEST_CASE("a box on four corners sticks by impulses that are not unique") {
+  const Problem p = random::stack(1, 1).problem();
+  const Solution s = solved(p, 1e-9);
+  const Proof near = prove(p, s.impulses);
+  INFO(near.reason);
+  REQUIRE(near.status == ProofStatus::proven_nearby);
+  CHECK(near.relative_change <= 1e-14);
+  CHECK(near.relative_radius <= 1e-8);
+  CHECK(prove(p, s.impulses, 0).status == ProofStatus::not_proven);
+  // The change covers the exact residual of the point, which sticks.
+  const detail::ProofIsland island = detail::proof_island(p, s.impulses);
+  const detail::NearbySolution point = detail::nearby_solution(island, detail::polish(island));
+  REQUIRE(point.box.radius.isZero(0));
+  for (int r = 0; r < island.b.size(); ++r) {
+    Exact w = -Exact(island.b[r]);
+    for (int c = 0; c < island.b.size(); ++c) w += Exact(island.A(r, c)) * Exact(point.box.x[c]);
+    CHECK(abs(w) <= Exact(point.change[r]));
+  }
+}
+
+TEST_CASE("a problem without solution is not proven") {
+  MatrixXd A = MatrixXd::Identity(6, 6);
+  A(0, 3) = A(3, 0) = -1;  // a body is driven into two walls
+  VectorXd b = VectorXd::Zero(6);
+  b[0] = b[3] = 1;
+  const Problem p = Problem::dense(A, b, VectorXd::Constant(2, 0.5));
+  REQUIRE(solved(p, 1e-9).status == Status::infeasible);
+  random::Generator g(8);
+  for (double size : {0.0, 1.0, 1e3, 1e8}) {
+    VectorXd x(6);
+    for (double& v : x) v = size * g.normal();
+    const Proof q = prove(p, x);
+    INFO(size);
+    CHECK(q.status == ProofStatus::not_proven);
+    CHECK(q.radius == detail::kInfinity);
+    CHECK((q.contact >= 0 && !q.reason.empty()));
+  }
+}
+
+TEST_CASE("impulses that are no numbers, and wrong arguments") {
+  const Problem p = one(4, 1, -1);
+  for (double bad : {std::nan(""), detail::kInfinity, -detail::kInfinity}) {
+    const Proof q = prove(p, Eigen::Vector3d(4, bad, -1));
+    CHECK(q.status == ProofStatus::not_proven);
+    CHECK(q.contact == 0);
+  }
+  CHECK_THROWS_WITH(prove(p, VectorXd::Zero(2)), Catch::Contains("impulses has 2 entries"));
+  CHECK_THROWS_AS(prove(p, VectorXd::Zero(3), -1), std::invalid_argument);
+  CHECK_THROWS_AS(prove(p, VectorXd::Zero(3), std::nan("")), std::invalid_argument);
+  CHECK(prove(Problem(), VectorXd()).status == ProofStatus::proven);
+}
+
+TEST_CASE("numbers beyond doubles are not proven, and units do not matter") {
+  random::Generator g(9);
+  const Known k = known(g, 3);
+  const MatrixXd A = k.problem.dense_matrix();
+  const VectorXd mu = VectorXd::Constant(3, 0.5);
+  for (double mass : {0x1p-300, 0x1p-60, 0x1p40, 0x1p300}) {
+    const Problem p = Problem::dense(A * mass, k.problem.b(), mu);
+    const Proof q = prove(p, k.x / mass, 0);
+    INFO(mass << ": " << q.reason);
+    CHECK(q.status == ProofStatus::proven);
+    CHECK(q.relative_radius < 1e-12);
+  }
+  MatrixXd far = A;
+  far(0, 8) = far(8, 0) = 5e-324;
+  CHECK(prove(Problem::dense(far, k.problem.b(), mu), k.x).status == ProofStatus::not_proven);
+}
+
+TEST_CASE("nothing under another rounding mode") {
+  const Problem p = one(4, 1, -1);
+  const int before = std::fegetround();
+  for (int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
+    std::fesetround(mode);
+    const Proof q = prove(p, Eigen::Vector3d(4, 1, -1));
+    std::fesetround(before);
+    CHECK(q.status == ProofStatus::not_proven);
+  }
+}
+
+TEST_CASE("islands are proven one by one, the weakest counts") {
+  MatrixXd A = MatrixXd::Identity(9, 9);
+  VectorXd b(9);
+  b << 4, 1, -1, 10, 3, 4, 10, 6, 8;  // sticks; at the brink; slides
+  VectorXd x(9);
+  x << 4, 1, -1, 10, 3, 4, 10, 3, 4.5;
+  const Proof p = prove(Problem::dense(A, b, VectorXd::Constant(3, 0.5)), x);
+  CHECK(p.status == ProofStatus::proven_nearby);
+  CHECK(p.contact == 1);
+  CHECK(p.radius == Approx(0.5).epsilon(1e-12));
+  CHECK(p.regimes[2] == Regime::sliding);
+}
+
+TEST_CASE("packings, stacks and clusters with mu from 0.1 to 1") {
+  int exact = 0, all = 0;
+  const auto judge = [&](const Problem& p, double allowed = 1e-9) {
+    for (double tolerance : {1e-6, 1e-9}) {
+      const Solution s = solved(p, tolerance);
+      if (s.status != Status::solved) continue;
+      const Proof q = prove(p, s.impulses, allowed);
+      INFO(p.contacts() << " contacts, " << tolerance << ": " << q.reason << " " << q.contact);
+      CHECK(q.status != ProofStatus::not_proven);
+      CHECK(q.relative_radius <= 0.01);
+      exact += q.status == ProofStatus::proven ? 1 : 0;
+      ++all;
+    }
+  };
+  random::Generator g(11);
+  for (double mu : {0.1, 0.4, 0.7, 1.0}) {
+    for (bool spheres : {true, false}) {
+      const random::Packing close = random::close_packing(3, spheres, mu, 5);
+      judge(delassus(close.bodies, to_contacts(close.contacts)));
+    }
+    for (int boxes : {1, 3, 10})
+      for (double ratio : {1.0, 1e3, 1e6})  // of which rounding takes part of the digits of b
+        judge(random::stack(boxes, ratio, mu).problem(), 1e-14 * std::max(1e5, ratio));
+    for (int k = 0; k < 50; ++k) judge(random::cluster(g, mu).problem());
+  }
+  INFO(exact << " of " << all);
+  CHECK(all >= 480);
+  CHECK(exact >= 400);
+}
