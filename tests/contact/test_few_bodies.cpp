@@ -45,24 +45,24 @@ PlatePile pile(int plates, int points, double mu, unsigned seed) {
 
 }  // namespace
 
-TEST_CASE("few bodies: the solution is that of the matrix without bodies, for less work") {
+TEST_CASE("few bodies: the solution is that of the matrix alone, whose bodies are found") {
   const double mu = 0.6;
   const PlatePile p = pile(6, 40, mu, 7);
   const Problem by_bodies = delassus(p.bodies, p.contacts);
   const Eigen::VectorXd coefficients = Eigen::VectorXd::Constant(by_bodies.contacts(), mu);
-  const Problem by_contacts = Problem::dense(by_bodies.dense_matrix(), by_bodies.b(), coefficients);
+  const Problem by_matrix = Problem::dense(by_bodies.dense_matrix(), by_bodies.b(), coefficients);
   Options options;
   options.law = Law::coulomb;
   options.tolerance = 1e-10;
   const Solution few = Solver(options).solve(by_bodies);
-  const Solution many = Solver(options).solve(by_contacts);
+  const Solution many = Solver(options).solve(by_matrix);
   INFO("work " << few.counts.work << " and " << many.counts.work);
   CHECK(few.status == Status::solved);
   CHECK(many.status == Status::solved);
-  CHECK(evaluate(by_contacts, Law::coulomb, few.impulses).fixed_point <= 1e-10);
+  CHECK(evaluate(by_matrix, Law::coulomb, few.impulses).fixed_point <= 1e-10);
   // Impulses are not unique; velocities are here.
   CHECK((few.velocities - many.velocities).cwiseAbs().maxCoeff() < 1e-7);
-  CHECK(few.counts.work < 0.3 * many.counts.work);
+  CHECK(many.counts.work < 2 * few.counts.work);  // 4 by equations of contacts
 }
 
 TEST_CASE("few bodies: where interior points end, proximal problems go on") {

@@ -60,6 +60,9 @@ Status Automatic::rotate(Search& search, int most_idle) {
   prepare();
   sweeps_.start(search.best.data());
   const bool regular = is_regular(search.system);
+  if (!interior_.ordered()) look_for_bodies(search);
+  if (search.confirmed()) return Status::solved;
+  if (search.exhausted()) return Status::work_limit;
   const bool by_bodies = regular && interior_.order_bodies(search);
   double halved = search.best_error;
   bool first = true, solved = false, expensive = false, rounding = false;
@@ -131,6 +134,20 @@ Status Automatic::run(Search& search) {
                                                                        : kMostIdleRoundsBefore);
   }
   return status;
+}
+
+// Sweeps may solve the problem before it pays to look for bodies behind its matrix.
+void Automatic::look_for_bodies(Search& search) {
+  const double price = search.system.price_of_bodies();
+  if (search.system.body_form() != nullptr || price > interior_.cost(search) ||
+      !search.system.may_have_bodies())
+    return;
+  AcceleratedSweeps::Leave leave;
+  leave.price = leave.least_work = leave.most_work = price;
+  sweeps_.run(search, leave);
+  if (search.solved() || search.exhausted()) return;
+  search.system.find_bodies();
+  search.counts.work += price;
 }
 
 // Sweeps for half the price of a factorisation, with a guessed fill; then orders the matrix, which

@@ -93,8 +93,14 @@ void System::to_given_units(PackedVector* x) const {
   }
 }
 
+double System::price_of_bodies() const {
+  constexpr double kBlock = 12, kContact = 1500;  // ns
+  return kBlock * static_cast<double>(problem_->blocks().size()) + kContact * n_;
+}
+
 void System::reset(const Problem& given, Law law) {
   choose_units(given);
+  found_.reset();
   const Problem& problem = *problem_;
   law_ = &detail::kernels(law);
   n_ = problem.contacts();

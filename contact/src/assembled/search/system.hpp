@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 #include <tether/contact/solver.hpp>
 #include <tether/linalg/friction_cone.hpp>
 
 #include "law/interface/law.hpp"
 #include "problem/criterion.hpp"
+#include "problem/matrix_bodies.hpp"
 
 namespace tether::contact::detail {
 
@@ -41,6 +43,12 @@ class System {
 
   // The problem that stages solve: the given one, or the same in units without overflow.
   const Problem& problem() const { return *problem_; }
+  /// Its factors by bodies, given with it or found; null where there are none.
+  const BodyForm* body_form() const { return found_ ? found_.get() : problem_->body_form(); }
+  /// Looks for the bodies of a problem that is given by its matrix.
+  void find_bodies() { found_ = bodies_of_matrix(*problem_); }
+  bool may_have_bodies() const { return detail::may_have_bodies(*problem_); }
+  double price_of_bodies() const;  ///< estimated ns of find_bodies()
   bool in_other_units() const { return !mass_.empty(); }
   // Impulses of the given problem in these units, and back. Exact within the range of doubles.
   void to_own_units(PackedVector* x) const;
@@ -117,7 +125,8 @@ class System {
   const AssembledKernels& kernels() const { return any_replaced_ ? *law_->mixed : law_->assembled; }
 
   const Problem* problem_ = nullptr;
-  Problem rescaled_;               // empty where the given units serve
+  Problem rescaled_;  // empty where the given units serve
+  std::shared_ptr<const BodyForm> found_;
   std::vector<int> mass_, speed_;  // exponents of the units of each island; empty: those given
   const LawKernels* law_ = nullptr;
   int n_ = 0;

@@ -24,7 +24,7 @@ double NewtonMatrix::cost(const Search& search) const {
 
 bool NewtonMatrix::order_by_bodies(Search& search) {
   if (ordered_) return by_bodies_;
-  const BodyForm* given = search.system.problem().body_form();
+  const BodyForm* given = search.system.body_form();
   if (given == nullptr || 2 * given->contacts() < kContactsOfBody * given->nodes) return false;
   bodies_.order(*given);
   if (!(bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * cost(search))) return false;
@@ -47,7 +47,7 @@ void NewtonMatrix::order(Search& search) {
 // Four contacts a body cost a quarter in equations of bodies, 2.8 as much as in those of contacts.
 void NewtonMatrix::take_bodies_if_cheaper(Search& search) {
   constexpr int kSome = 3;  // contacts for two nodes
-  const BodyForm* given = search.system.problem().body_form();
+  const BodyForm* given = search.system.body_form();
   if (given == nullptr || 2 * given->contacts() < kSome * given->nodes) return;
   const double by_contacts = cost(search);
   search.counts.work += kOrderBodies * search.system.size();
