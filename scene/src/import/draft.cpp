@@ -79,17 +79,21 @@ std::optional<Joint> as_one(const Chain& chain) {
   return {};
 }
 
-void name_lost_laws(const Chain& chain, Remarks& remarks) {
-  for (const PlacedJoint& each : chain) {
-    const LinkJoint& law = each.law;
-    if (law.limits) remarks.add("limits of joints that are one joint here", law.name);
-    if (law.friction > 0) remarks.add("friction of joints that are one joint here", law.name);
-    const bool sprung = law.kind == MotionKind::ball && chain.size() == 1;
-    if (law.damping > 0 && !sprung)
-      remarks.add("damping of joints that are one joint here", law.name);
-    if (law.stiffness > 0 && !sprung)
-      remarks.add("stiffness of joints that are one joint here", law.name);
-  }
+/// Laws of a joint without a coordinate; `sprung`: it has springs and dampers all the same.
+void name_lost_laws(const LinkJoint& law, bool sprung, Remarks& remarks) {
+  static constexpr const char* kWords[] = {"friction", "damping", "stiffness", "limits"};
+  const bool has[] = {law.friction > 0, law.damping > 0 && !sprung, law.stiffness > 0 && !sprung,
+                      law.limits.has_value()};
+  for (std::size_t k = 0; k < std::size(has); ++k)
+    if (has[k])
+      remarks.add(fmt::format("{} of balls, free and planar joints", kWords[k]), law.name);
+}
+
+/// Whether something acts along the coordinate of a joint, which it needs for that.
+bool has_laws(const PlacedJoint& placed, const ImportOptions& options) {
+  const LinkJoint& law = placed.law;
+  return law.damping > 0 || law.stiffness > 0 || law.armature > 0 || law.is_driven || law.mimic ||
+         (options.joint_laws && (law.limits || law.friction > 0));
 }
 
 std::string names(const Chain& chain) {
@@ -135,7 +139,7 @@ void add_single(const PlacedJoint& placed, int first, int second, const ImportOp
   if (one_way)
     add_laws(placed, options, joint, comment, remarks);
   else
-    name_lost_laws({placed}, remarks);
+    name_lost_laws(law, law.kind == MotionKind::ball, remarks);
   if ((one_way || law.kind == MotionKind::ball) && (law.stiffness > 0 || law.damping > 0))
     joint.spring = JointSpring{law.stiffness, law.damping, one_way ? law.rest - placed.value : 0};
   draft.scene.joints.push_back(std::move(joint));
@@ -186,6 +190,7 @@ class Drafting {
       add_joints(part, body_of_[k], on, options_, draft_, remarks_);
     }
     add_couplings();
+    add_rotors_and_drives(model_, parts_, options_, draft_, remarks_);
     add_closures(model_, parts_, body_of_, draft_, remarks_);
     add_contacts();
     make_unique();
@@ -428,16 +433,17 @@ void add_joints(const Part& part, int body, int on, const ImportOptions& options
                 Remarks& remarks) {
   const Chain& chain = part.joints;
   if (count(chain, MotionKind::free) > 0) {
+    for (const PlacedJoint& each : chain) name_lost_laws(each.law, false, remarks);
     if (chain.size() > 1)
       remarks.add("joints in a row with a free one, which leaves nothing of them", part.name);
     return;
   }
   if (chain.size() == 1) return add_single(chain[0], body, on, options, draft, remarks);
-  if (std::optional<Joint> one = as_one(chain)) {
+  const bool plain = !any_of(chain, [&](const PlacedJoint& j) { return has_laws(j, options); });
+  if (std::optional<Joint> one = plain ? as_one(chain) : std::nullopt) {
     one->name = names(chain);
     one->first = body;
     one->second = on;
-    name_lost_laws(chain, remarks);
     draft.joint_comments.push_back(
         fmt::format("{} joints from line {} on", chain.size(), chain.front().law.line));
     draft.scene.joints.push_back(std::move(*one));

@@ -15,6 +15,7 @@ struct ImportOptions {
   double height = 0;          ///< m: the base is raised by this
   std::vector<std::pair<std::string, double>> positions;  ///< of joints: rad, m
   std::set<std::string> held;                             ///< joints that do not move
+  std::vector<std::pair<std::string, double>> controls;   ///< of actuators; others: 0
   bool joint_laws = true;                                 ///< limits and friction of joints
   std::optional<double> ground;                           ///< m: the height of a plane to stand on
   std::optional<double> friction;  ///< of all contacts; without: as the file says, 1 in a URDF

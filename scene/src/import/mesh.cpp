@@ -20,7 +20,7 @@ std::string without(std::string_view prefix, const std::string& name) {
   return name.substr(0, prefix.size()) == prefix ? name.substr(prefix.size()) : "";
 }
 
-// Of package://name/file the file in the folder of the robot, then name/file and file in those
+// package://name/file is file in the folder of the robot, then name/file and file in those
 // above it up to the folder of all files.
 std::string find_file(const Problems& robot, const std::string& name) {
   namespace fs = std::filesystem;

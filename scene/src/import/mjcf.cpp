@@ -6,6 +6,7 @@
 
 #include <tether/linalg/symmetric_eigen.hpp>
 
+#include "mjcf_actuators.hpp"
 #include "mjcf_geom.hpp"
 
 namespace tether::scene::import {
@@ -129,8 +130,7 @@ void Reader::joint(const Node& node, int of, const std::string& class_name) {
   out.stiffness = tag.not_negative("stiffness", 0);
   out.damping = tag.not_negative("damping", 0);
   out.friction = tag.not_negative("frictionloss", 0);
-  if (tag.not_negative("armature", 0) > 0)
-    model_.remarks.add("armature (inertia of rotors)", out.name);
+  out.armature = tag.not_negative("armature", 0);
   const std::string limited = tag.text("limited", "auto");
   if (limited != "auto" && limited != "true" && limited != "false")
     tag.wrong("limited", "must be true, false or auto");
@@ -248,17 +248,21 @@ Model read_mjcf(const Node& root, Problems& problems) {
   const Settings settings = mjcf::read_settings(root, model, problems);
   Reader reader(model, settings, problems);
   bool has_world = false;
+  const mjcf::Tendons tendons = mjcf::read_tendons(root, settings, model, problems);
   std::vector<const Node*> equalities;
   for (const Node* each = root.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
     if (is(*each, "worldbody")) {
       has_world = true;
       reader.world(*each);
-    } else if (!is(*each, "compiler") && !is(*each, "option") && !is(*each, "default")) {
+    } else if (!is(*each, "compiler") && !is(*each, "option") && !is(*each, "default") &&
+               !is(*each, "tendon")) {
       for (const Node* part = each->FirstChildElement(); part != nullptr;
            part = part->NextSiblingElement())
         if (is(*each, "contact") && is(*part, "exclude"))
           read_excluded(*part, model, problems);
+        else if (is(*each, "actuator"))
+          mjcf::read_actuator(*part, settings, tendons, model, problems);
         else if (is(*each, "equality"))
           equalities.push_back(part);
         else

@@ -122,8 +122,8 @@ Quaterniond from_euler(const Vector3d& angles, const std::string& sequence) {
 
 }  // namespace
 
-const Attributes* Settings::defaults(const Node& node, const std::string& name,
-                                     Problems& problems) const {
+const Attributes* Settings::defaults(const Node& node, const std::string& name, Problems& problems,
+                                     std::string_view element) const {
   auto found = classes.find(name);
   const bool is_outermost = name.empty() || outermost.count(name) > 0;
   if (found == classes.end() && is_outermost) found = classes.find("");
@@ -133,7 +133,7 @@ const Attributes* Settings::defaults(const Node& node, const std::string& name,
                    "no <default> has this class");
     return nullptr;
   }
-  const auto of = found->second.find(node.Name());
+  const auto of = found->second.find(element.empty() ? node.Name() : std::string(element));
   return of == found->second.end() ? nullptr : &of->second;
 }
 

@@ -30,8 +30,10 @@ struct Settings {
   std::size_t copied = 0;               ///< attributes that classes have from those around them
 
   double angle(double x) const { return degrees ? x * (linalg::kPi / 180) : x; }
-  /// Attributes of `element` in a class ("": the outermost). Reports a class that is not there.
-  const Attributes* defaults(const Node& node, const std::string& name, Problems& problems) const;
+  /// Attributes of elements called `element` (empty: as the node) in a class ("": the outermost).
+  /// Reports a class that is not there.
+  const Attributes* defaults(const Node& node, const std::string& name, Problems& problems,
+                             std::string_view element = {}) const;
 };
 
 /// One of quat, axisangle, euler, xyaxes, zaxis; none: the identity.

@@ -55,6 +55,16 @@ void check_names(const Model& model, const ImportOptions& options) {
                                               value, joint.limits->first, joint.limits->second));
   }
   for (const std::string& name : options.held) look("--hold", name);
+  for (const auto& [name, value] : options.controls) {
+    const auto drive = std::find_if(model.drives.begin(), model.drives.end(),
+                                    [&n = name](const Drive& each) { return each.name == n; });
+    if (drive == model.drives.end())
+      throw std::invalid_argument(
+          shown(fmt::format("--control {}: no actuator that is taken over has this name", name)));
+    if (drive->has_activation)
+      throw std::invalid_argument(
+          shown(fmt::format("--control {}: acts through a state, which scenes do not have", name)));
+  }
 }
 
 const LinkJoint* find_joint(const Model& model, const std::string& name) {
@@ -281,8 +291,18 @@ void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
 
 }  // namespace
 
+void find_driven(Model& model, const ImportOptions& options) {
+  std::set<std::string> driven;
+  for (const Drive& drive : model.drives)
+    for (const Transmission& to : drive.to)
+      if (!law_of(drive, options).isZero(0)) driven.insert(to.joint);
+  for (Link& link : model.links)
+    for (LinkJoint& joint : link.joints) joint.is_driven = driven.count(joint.name) > 0;
+}
+
 std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
   check_names(model, options);
+  find_driven(model, options);
   std::vector<LinkStart> out;
   for (const Link& link : model.links) {
     LinkStart start;

@@ -48,6 +48,8 @@ struct LinkJoint {
   double reference = 0;
   double friction = 0;                ///< N m, N
   double stiffness = 0, damping = 0;  ///< N/m, N s/m: of slides; N m/rad, N m s: of hinges
+  double armature = 0;                ///< kg m^2, kg: inertia of a rotor
+  bool is_driven = false;             ///< by an actuator that exerts something
   double rest = 0;                    ///< of the stiffness
   std::optional<Mimic> mimic;
   int line = 0;
@@ -96,6 +98,22 @@ struct Closure {
   int line = 0;
 };
 
+/// An actuator pulls at a joint with ratio times its force.
+struct Transmission {
+  std::string joint;
+  double ratio = 1;
+};
+
+/// An actuator whose force is (gain control + bias) . (1, length, speed), within bounds.
+struct Drive {
+  std::string name;
+  std::vector<Transmission> to;  ///< none: it pulls at something else
+  Eigen::Vector3d gain = Eigen::Vector3d::Zero(), bias = Eigen::Vector3d::Zero();
+  std::optional<std::pair<double, double>> control, force;
+  bool has_activation = false;  ///< its control acts through a state, which starts at 0
+  int line = 0;
+};
+
 struct Model {
   std::string name, format;
   std::vector<Link> links;  ///< parents before children
@@ -104,6 +122,7 @@ struct Model {
   bool base_is_said = true;     ///< false: whether the base is fixed is up to who uses the file
   bool touches_itself = false;  ///< moving links touch each other, but for neighbours in the tree
   std::vector<Closure> closures;
+  std::vector<Drive> drives;
   std::vector<std::pair<std::string, std::string>> excluded;  ///< names of links that do not
   Remarks remarks;
 };

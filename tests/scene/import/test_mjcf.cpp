@@ -313,6 +313,76 @@ TEST_CASE("MJCF: loops close by connect and weld, and joints follow each other b
   CHECK(mjcf_refusal(with("<connect body1='c'/>")).find("anchor") != std::string::npos);
 }
 
+TEST_CASE("MJCF: actuators and armature that scenes lack are named, with what they are of") {
+  const std::string body =
+      "<body name='a'><joint name='h' axis='0 1 0' armature='.2'/><geom size='.1'/>"
+      "<body name='b' pos='1 0 0'><joint name='ball' type='ball' armature='.2'/><geom size='.1'/>"
+      "</body></body><body name='c'><joint name='f' type='free' armature='.2' damping='1'/>"
+      "<geom size='.1'/></body>";
+  const auto with = [&](const std::string& more) {
+    const std::string text = world(body);
+    return text.substr(0, text.size() - std::string("</mujoco>\n").size()) + more + "</mujoco>\n";
+  };
+  const auto actuator = [&](const std::string& each) {
+    return with(
+        "<tendon><fixed name='t'><joint joint='h' coef='1'/><joint joint='ball' coef='1'/>"
+        "</fixed></tendon><actuator>" +
+        each + "</actuator>");
+  };
+  CHECK(said(with(""), "armature of what is no hinge or slider here: ball, f"));
+  CHECK(said(with(""), "damping of balls, free and planar joints: f"));
+  CHECK(said(actuator("<motor name='m' joint='h'/>"), "exert nothing (--control): m"));
+  CHECK(said(actuator("<muscle name='m' joint='h'/>"), "kind muscle: m"));
+  CHECK(said(actuator("<general name='m' joint='h' gaintype='muscle'/>"), "kind general: m"));
+  CHECK(said(actuator("<velocity name='m' joint='ball'/>"), "no hinge or slider here: m"));
+  CHECK(said(actuator("<position name='m' site='s'/>"), "other things than joints"));
+  CHECK(said(actuator("<position name='m' tendon='t'/>"), "no hinge or slider here: m"));
+  CHECK(said(actuator("<position name='m' joint='h'/><velocity name='n' joint='h'/>"),
+             "further actuators of a joint: n"));
+  CHECK(said(actuator("<general name='m' joint='h' biastype='affine' biasprm='0 1 0'/>"),
+             "negative stiffness or damping: m"));
+  CHECK(said(with("<tendon><fixed name='t' stiffness='3'><joint joint='h' coef='1'/></fixed>"
+                  "</tendon>"),
+             "tendons with stiffness, damping, friction, armature or limits: t"));
+  CHECK(said(actuator("<motor name='m' joint='h'/>"), "without a force of their own: t"));
+  CHECK(said(actuator("<position name='m' joint='h'/>"), "to the nearest of all turns: h"));
+
+  import::ImportOptions options;
+  options.controls = {{"m", 3}};
+  const Scene scene = mjcf_scene(actuator("<motor name='m' joint='h' gear='2'/>"), options);
+  REQUIRE(scene.loads.size() == 1);
+  CHECK(scene.loads[0].in_body);
+  CHECK(scene.loads[0].torque.y() == Approx(6));
+  REQUIRE(scene.couplings.size() == 1);
+  CHECK(scene.bodies.back().name == "rotor of h");
+  CHECK(scene.bodies.back().inertia(0, 0) == 0.2);
+  const auto refused = [&](const std::string& each) {
+    return tether::test::thrown<std::exception>(
+        [&] { import_robot(actuator(each), "robot.xml", options); });
+  };
+  CHECK(refused("<motor name='n' joint='h'/>").find("--control m: no actuator") == 0);
+  CHECK(refused("<general name='m' joint='h' dyntype='filter'/>").find("through a state") !=
+        std::string::npos);
+  CHECK(refused("<motor name='m' joint='h' ctrlrange='1 -1'/>").find("ctrlrange") !=
+        std::string::npos);
+}
+
+TEST_CASE("MJCF: kinds of actuators share the attributes of their class") {
+  const std::string text =
+      "<mujoco><default><general gear='3' ctrlrange='-2 2'/><motor gear='5'/></default><worldbody>"
+      "<body name='a'><joint name='h'/><joint name='s' type='slide'/><geom size='.1'/></body>"
+      "</worldbody><actuator><motor name='m' joint='h'/><velocity name='v' joint='s' kv='2'/>"
+      "</actuator></mujoco>";
+  ImportOptions options;
+  options.controls = {{"m", 9}, {"v", 1}};
+  const Scene scene = mjcf_scene(text, options);
+  REQUIRE(scene.loads.size() == 1);
+  CHECK(scene.loads[0].torque.z() == Approx(10));  // at the bound of control
+  REQUIRE(scene.joints[1].motor);
+  CHECK(scene.joints[1].motor->damping == Approx(18));
+  CHECK(scene.joints[1].motor->rate == Approx(1.0 / 3));
+}
+
 TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with its line") {
   const auto refused = [](const std::string& text, const std::string& words) {
     INFO(text);

@@ -18,21 +18,21 @@ namespace {
 
 struct ImportArguments {
   std::string file, out = "-", base, files;
-  std::vector<std::string> joints, held;
+  std::vector<std::string> joints, held, controls;
   std::optional<double> ground, friction, density;
   double height = 0, end = 1;
   bool no_joint_laws = false, mend = false, hulls = false, strict = false, force = false;
 };
 
 /// NAME=VALUE; a name may have an equals sign, a value has none.
-std::pair<std::string, double> read_position(const std::string& word) {
+std::pair<std::string, double> read_named(const char* option, const std::string& word,
+                                          const char* what) {
   const std::size_t equals = word.rfind('=');
   const auto value = equals == std::string::npos || equals == 0
                          ? std::nullopt
                          : finite_number(word.substr(equals + 1));
   if (!value)
-    throw std::invalid_argument(
-        fmt::format("--joint {}: must be NAME=VALUE, a position in rad or m", word));
+    throw std::invalid_argument(fmt::format("{} {}: must be NAME=VALUE, {}", option, word, what));
   return {word.substr(0, equals), *value};
 }
 
@@ -40,7 +40,10 @@ import::ImportOptions options_of(const ImportArguments& a){import::ImportOptions
 out.base = a.base == "fixed"  ? import::Base::fixed
            : a.base == "free" ? import::Base::free
                               : import::Base::as_file;
-for (const std::string& word : a.joints) out.positions.push_back(read_position(word));
+for (const std::string& word : a.joints)
+  out.positions.push_back(read_named("--joint", word, "a position in rad or m"));
+for (const std::string& word : a.controls)
+  out.controls.push_back(read_named("--control", word, "a number"));
 out.held.insert(a.held.begin(), a.held.end());
 for (const auto& [name, number] : {std::pair{"--height", a.height},
                                    {"--ground", a.ground.value_or(0)},
@@ -87,6 +90,8 @@ void add_import_command(CLI::App& app, int* status) {
       ->check(CLI::IsMember({"fixed", "free"}));
   command->add_option("--height", a->height, "Raise the robot by this, m");
   command->add_option("--joint", a->joints, "Start: NAME=VALUE, rad or m; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--control", a->controls, "Of an actuator: NAME=VALUE [0]; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--hold", a->held, "Fix this joint where it starts; may be repeated")
       ->allow_extra_args(false);
