@@ -4,7 +4,7 @@
     python3 benchmarks/results.py [NAME...]      # all of them take an hour; --list names them, --index only lists what there is
 
 Programs are those of build/release. Contact problems are looked for in TETHER_CONTACT_DATA, recorded
-throws in TETHER_TOSSES. Comparisons of codes run with the SUNDIALS of TETHER_SUNDIALS or build/sundials, at -O3."""
+throws in TETHER_TOSSES, checkouts with robots in TETHER_ROBOTS. Comparisons of codes run with the SUNDIALS of TETHER_SUNDIALS or build/sundials, at -O3."""
 import datetime
 import os
 import pathlib
@@ -86,6 +86,10 @@ COMMANDS = {
                "by a rigid cube with one coefficient each; the last row is what the measured start leaves open.",
                "cmake --build build/release --target peers >&2 && "
                "python3 benchmarks/tosses/tosses.py build/release/benchmarks/peers $TETHER_TOSSES"),
+    "import": ("Robots of other programs as scenes",
+               "All .urdf and .xml files of Daniella1/urdf_files_dataset, google-deepmind/dm_control and Farama-Foundation/Gymnasium, "
+               "imported with the hulls of meshes and run for 0.02 s. A file that is imported only with an option is counted with it.",
+               f"python3 benchmarks/import/survey.py {TETHER} $TETHER_ROBOTS/*"),
     "verify": ("Shipped scenes judged by an independent checker",
                "At most 0.3 s of each scene, every step, by `scene/tools/verify.py`, which shares no code with Tether. Judgements are those of "
                "contact forces, joints and balances of impulses.",

@@ -152,7 +152,10 @@ int add_between(const Part& part, int body, std::size_t number, Draft& draft) {
   Body small;
   small.name = fmt::format("{} joint {}", carried.name, number);
   small.mass = kSmallBody * carried.mass;
-  small.inertia = kSmallBody * part.inertia.cwiseAbs().maxCoeff() * Eigen::Matrix3d::Identity();
+  double about = part.inertia.cwiseAbs().maxCoeff();  // the joints, about which the body turns
+  for (const PlacedJoint& each : part.joints)
+    about += carried.mass * (each.at - carried.position).squaredNorm();
+  small.inertia = kSmallBody * about * Eigen::Matrix3d::Identity();
   small.position = carried.position;
   small.orientation = carried.orientation;
   draft.scene.bodies.push_back(std::move(small));
@@ -192,7 +195,7 @@ class Drafting {
     add_couplings();
     add_rotors_and_drives(model_, parts_, options_, draft_, remarks_);
     add_closures(model_, parts_, body_of_, draft_, remarks_);
-    add_contacts();
+    if (model_.touches) add_contacts();
     make_unique();
     const Scene& scene = draft_.scene;
     const bool laws =

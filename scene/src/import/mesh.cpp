@@ -66,6 +66,7 @@ std::optional<Shape> read_mesh(const Problems& robot, const std::string& name,
 namespace {
 
 constexpr double kNearHull = 1e-3;  // of the extent: what hulls leave out of a mesh at most
+constexpr double kFarthest = 0.1;   // of the extent: beyond, no hull is found
 constexpr double kInPlane = 1e-7;   // of the extent: as linalg::hull_faces()
 
 using Faces = std::vector<std::vector<std::size_t>>;
@@ -103,14 +104,24 @@ std::vector<Vector3d> corners_of(const std::vector<Vector3d>& points, const Face
   return out;
 }
 
+/// Each edge has a face on both sides: rounding may leave one out where points hardly leave a
+/// plane.
+bool is_closed(const Faces& faces) {
+  std::set<std::pair<std::size_t, std::size_t>> edges;
+  for (const std::vector<std::size_t>& face : faces)
+    for (std::size_t k = 0; k < face.size(); ++k)
+      if (!edges.insert({face[k], face[(k + 1) % face.size()]}).second) return false;
+  return all_of(edges, [&](const auto& e) { return edges.count({e.second, e.first}) > 0; });
+}
+
 struct MeshHull {
   std::vector<Vector3d> corners;  // none: it is flat
-  bool is_near = false;           // points are above it, by at most kNearHull
+  double left_out = 0;            // of the extent: how far points may be above it
 };
 
-/// Corners that grow from six points until none is farther above their hull: a hull of all points
-/// takes the product of points and faces.
-MeshHull near_hull(const std::vector<Vector3d>& points) {
+/// Corners that grow from six points until no point is farther above their hull than `near`: a hull
+/// of all points takes the product of points and faces. None where it is flat.
+MeshHull near_hull(const std::vector<Vector3d>& points, double near) {
   Vector3d low = points.front(), high = low;
   for (const Vector3d& p : points) {
     low = low.cwiseMin(p);
@@ -126,25 +137,30 @@ MeshHull near_hull(const std::vector<Vector3d>& points) {
           [&](const Vector3d& a, const Vector3d& b) { return side * u.dot(a - b) < 0; }));
   while (some.size() <= kMostPoints) {
     const Faces faces = linalg::hull_faces(some);
-    if (faces.empty()) break;
-    const std::vector<Vector3d> more = farthest_above(some, faces, points, kNearHull * extent);
-    if (more.empty())
-      return {corners_of(some, faces),
-              !farthest_above(some, faces, points, kInPlane * extent).empty()};
+    if (faces.empty()) return {corners_of(points, linalg::hull_faces(points))};
+    const std::vector<Vector3d> more = farthest_above(some, faces, points, near * extent);
+    if (more.empty()) {
+      const bool is_exact = farthest_above(some, faces, points, kInPlane * extent).empty();
+      return {corners_of(some, faces), is_exact ? 0 : near};
+    }
     some.insert(some.end(), more.begin(), more.end());
   }
-  return {corners_of(points, linalg::hull_faces(points))};
+  return {some};
 }
 
 }  // namespace
 
 std::optional<Shape> hull_of(const Shape& mesh, const std::string& of, Remarks& remarks) {
-  MeshHull hull = near_hull(mesh.points);
+  MeshHull hull = near_hull(mesh.points, kNearHull);
+  for (double near = 2 * kNearHull; near < kFarthest && hull.corners.size() <= kMostPoints &&
+                                    !is_closed(linalg::hull_faces(hull.corners));
+       near *= 2)
+    hull = near_hull(mesh.points, near);
   Shape out = Shape::convex(std::move(hull.corners));
   out.position = mesh.position;
   out.orientation = mesh.orientation;
-  if (hull.is_near)
-    remarks.add(fmt::format("hulls of meshes within {} of their extent", kNearHull), of);
+  if (hull.left_out > 0)
+    remarks.add(fmt::format("hulls of meshes within {} of their extent", hull.left_out), of);
   if (!out.points.empty() && out.points.size() <= kMostPoints) return out;
   remarks.add(out.points.empty() ? "left out, as it is flat: <mesh>"
                                  : "left out, as its hull has too many corners: <mesh>",

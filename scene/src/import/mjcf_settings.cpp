@@ -57,6 +57,7 @@ void read_option(const Node& node, Model& model, Problems& problems) {
   if (const Node* const flags = node.FirstChildElement("flag")) {
     Tag flag(*flags, problems);
     if (flag.text("gravity", "enable") == "disable") model.gravity.reset();
+    model.touches = flag.text("contact", "enable") != "disable";
     flag.finish(model.remarks);
   }
 }

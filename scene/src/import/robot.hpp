@@ -121,6 +121,7 @@ struct Model {
   double step = 0;              ///< s; 0: not said
   bool base_is_said = true;     ///< false: whether the base is fixed is up to who uses the file
   bool touches_itself = false;  ///< moving links touch each other, but for neighbours in the tree
+  bool touches = true;          ///< false: nothing touches anything
   std::vector<Closure> closures;
   std::vector<Drive> drives;
   std::vector<std::pair<std::string, std::string>> excluded;  ///< names of links that do not

@@ -253,6 +253,14 @@ TEST_CASE("MJCF: the edges of a box between two points stand as MuJoCo turns the
   CHECK((body.position - (from + to) / 2).norm() < 1e-14);
 }
 
+TEST_CASE("MJCF: nothing touches where the file disables contacts") {
+  const std::string bodies =
+      "<geom type='plane' size='1 1 1'/><body name='b' pos='0 0 1'><freejoint/><geom size='.1'/>"
+      "</body>";
+  CHECK(mjcf_scene(world(bodies)).pairs.size() == 2);
+  CHECK(mjcf_scene(world(bodies, "<option><flag contact='disable'/></option>")).pairs.empty());
+}
+
 TEST_CASE("MJCF: balanceinertia replaces the moments that no body has by their mean") {
   const std::string body =
       "<body name='b'><freejoint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 3'/></body>"
