@@ -204,6 +204,16 @@ Faces hull_faces(const std::vector<Vector3d>& points) {
   return Hull(points).faces();
 }
 
+std::vector<Vector3d> points_of_faces(const std::vector<Vector3d>& points, const Faces& faces) {
+  std::vector<char> is_corner(points.size(), 0);
+  for (const std::vector<Index>& face : faces)
+    for (const Index k : face) is_corner[k] = 1;
+  std::vector<Vector3d> out;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    if (is_corner[k] != 0) out.push_back(points[k]);
+  return out;
+}
+
 // Andrew's monotone chain: the lower side from left to right, then the upper one back.
 std::vector<Index> hull_corners(const std::vector<Vector2d>& q) {
   std::vector<Index> order(q.size());

@@ -94,16 +94,6 @@ std::vector<Vector3d> farthest_above(const std::vector<Vector3d>& corners, const
   return out;
 }
 
-std::vector<Vector3d> corners_of(const std::vector<Vector3d>& points, const Faces& faces) {
-  std::vector<char> is_corner(points.size(), 0);
-  for (const std::vector<std::size_t>& face : faces)
-    for (const std::size_t k : face) is_corner[k] = 1;
-  std::vector<Vector3d> out;
-  for (std::size_t k = 0; k < points.size(); ++k)
-    if (is_corner[k] != 0) out.push_back(points[k]);
-  return out;
-}
-
 /// Each edge has a face on both sides: rounding may leave one out where points hardly leave a
 /// plane.
 bool is_closed(const Faces& faces) {
@@ -137,11 +127,11 @@ MeshHull near_hull(const std::vector<Vector3d>& points, double near) {
           [&](const Vector3d& a, const Vector3d& b) { return side * u.dot(a - b) < 0; }));
   while (some.size() <= kMostPoints) {
     const Faces faces = linalg::hull_faces(some);
-    if (faces.empty()) return {corners_of(points, linalg::hull_faces(points))};
+    if (faces.empty()) return {linalg::points_of_faces(points, linalg::hull_faces(points))};
     const std::vector<Vector3d> more = farthest_above(some, faces, points, near * extent);
     if (more.empty()) {
       const bool is_exact = farthest_above(some, faces, points, kInPlane * extent).empty();
-      return {corners_of(some, faces), is_exact ? 0 : near};
+      return {linalg::points_of_faces(some, faces), is_exact ? 0 : near};
     }
     some.insert(some.end(), more.begin(), more.end());
   }

@@ -260,13 +260,7 @@ class Splitter {
     if (parts_.size() == kMostParts)
       too_much("has more than " + std::to_string(kMostParts) + " convex parts, too many");
     volume_ += volume_of(points, faces);
-    std::vector<char> is_corner(points.size(), 0);
-    for (const std::vector<std::size_t>& face : faces)
-      for (const std::size_t k : face) is_corner[k] = 1;
-    std::vector<Vector3d> corners;
-    for (std::size_t k = 0; k < points.size(); ++k)
-      if (is_corner[k] != 0) corners.push_back(points[k]);
-    parts_.push_back(std::move(corners));
+    parts_.push_back(linalg::points_of_faces(points, faces));
   }
 
   const ClosedSurface& solid_;
