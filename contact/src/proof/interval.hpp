@@ -10,8 +10,8 @@ namespace tether::contact::detail {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Unit roundoff u: a rounded operation errs by at most u times its result.
 constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-/// More than underflow takes from a term of a sum, even if subnormal results are flushed to zero.
-constexpr double kTiny = 8 * std::numeric_limits<double>::min();
+/// More than underflow takes from a term of a sum.
+constexpr double kTiny = std::numeric_limits<double>::min();
 
 /// At least the exact sum of `terms` products of numbers >= 0 that was computed as `sum`, in any
 /// order. It is at most sum / (1 - gamma), gamma = terms u / (1 - terms u) (Higham, Accuracy and

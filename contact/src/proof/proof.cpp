@@ -2,7 +2,6 @@
 // BSD-3-Clause
 #include <tether/contact/proof.hpp>
 
-#include <cfenv>
 #include <cfloat>
 #include <cmath>
 #include <stdexcept>
@@ -86,7 +85,7 @@ Proof prove_island(const Problem& problem, const VectorX& given, double allowed)
     if (out.status != ProofStatus::not_proven) return out;
     Options options;
     options.law = Law::coulomb;
-    options.tolerance = 1e-13;
+    options.tolerance = 1e-13;  // near rounding, which ends the solve where it comes first
     return prove_from(problem, Solver(options).solve(problem, given).impulses, given, allowed);
   } catch (const std::range_error& e) {
     return without_proof(0, e.what());
@@ -107,9 +106,11 @@ void join(Proof& whole, const Proof& part, const std::vector<int>& contacts) {
     whole.regimes[at(contacts[k])] = part.regimes[k];
 }
 
-bool rounds_to_nearest() {
-  return std::numeric_limits<double>::is_iec559 && FLT_EVAL_METHOD == 0 &&
-         std::fegetround() == FE_TONEAREST;
+// Also of the program that calls: -ffast-math makes it flush subnormal numbers to zero.
+bool arithmetic_is_ieee() {
+  const volatile double least = std::numeric_limits<double>::min(), one = 1;
+  const bool nearest = one + least == one && one - least == one;
+  return std::numeric_limits<double>::is_iec559 && FLT_EVAL_METHOD == 0 && nearest && least / 2 > 0;
 }
 
 }  // namespace
@@ -132,12 +133,14 @@ Proof prove(const Problem& problem, const linalg::VectorView& impulses, double a
   const int d = problem.dimension(), n = problem.contacts();
   if (impulses.size() != d * n)
     detail::refuse_size("impulses", impulses.size(), d * n, std::to_string(d) + " a contact");
-  detail::require(allowed >= 0, "allowed", allowed, "must be >= 0");
+  detail::require(allowed >= 0 && std::isfinite(allowed), "allowed", allowed,
+                  "must be >= 0 and finite");
   for (int r = 0; r < d * n; ++r)
     if (!std::isfinite(impulses[r]))
       return detail::without_proof(r / d, "an impulse is " + detail::shown(impulses[r]));
-  if (!detail::rounds_to_nearest())
-    return detail::without_proof(-1, "doubles are not rounded to nearest");
+  if (!detail::arithmetic_is_ieee())
+    return detail::without_proof(
+        -1, "the program does not round to nearest, or flushes subnormal numbers to zero");
   Proof out;
   out.status = ProofStatus::proven;
   out.regimes.resize(at(n));

@@ -28,7 +28,7 @@ struct Proof {
   double relative_radius = 0;  ///< over the largest |x_i|
   /// proven_nearby: x* solves (A, b', mu) with |b'_r - b_r| <= change in every row r, m/s; else 0.
   double change = 0;
-  /// The largest over the largest |b_r| of its island, those of each contact over sqrt(A_nn).
+  /// The largest over the largest |b_r| of its island, both divided by about sqrt(A_nn).
   double relative_change = 0;
   std::vector<Regime> regimes;  ///< of x*, by contact; without a proof empty
   int contact = -1;             ///< the first contact that prevents a stronger status, else -1
@@ -48,9 +48,10 @@ struct Proof {
 ///
 /// The default of `allowed` is the default tolerance of a Solver, which is relative to velocities,
 /// too; 0 accepts proofs of the problem itself alone. A is dense over an island; work grows with
-/// the third power of its touching contacts. Needs IEEE doubles that are rounded to nearest, or
-/// nothing is proven. Throws std::invalid_argument on sizes that do not match and allowed < 0.
-/// Rump, Acta Numerica 19 (2010) 287; Acary, Brémond and Huber (2018) for the law.
+/// the third power of its touching contacts. Nothing is proven in a program that does not round to
+/// nearest or flushes subnormal numbers to zero, as -ffast-math may make it. Throws
+/// std::invalid_argument on sizes that do not match, allowed < 0 or infinite. Rump, Acta Numerica
+/// 19 (2010) 287; Acary, Bremond and Huber (2018) for the law.
 Proof prove(const Problem& problem, const linalg::VectorView& impulses, double allowed = 1e-9);
 
 }  // namespace tether::contact
