@@ -74,7 +74,7 @@ COMMANDS = {
                f"python3 benchmarks/mechanisms/iftomm.py {TETHER}"),
     "clearance": ("A slider-crank with clearance", "Work and error of the largest of three angles, rad, at the end.",
                   f"python3 benchmarks/clearance/clearance.py {TETHER}"),
-    "peers": ("Joints, friction and impacts beside Bullet, ODE, MuJoCo and Simbody",
+    "peers": ("Joints, friction and impacts beside Bullet, ODE, MuJoCo, Siconos and Simbody",
               "Error: the largest distance of points of the bodies from the reference at ten equal times, m; sizes are near 1 m. "
               "References: `benchmarks/peers/references.py`. Times: processor time of the motion alone in ms, best of 3, at the "
               "errors that head the columns; \"-\": not within the limit of a run.",

@@ -57,6 +57,9 @@ ENGINES = {
         'CPodes': (TOLERANCES, 'as before, BDF'),
         'SemiExplicitEuler': (STEPS, 'rigid contacts, the impulse solver PLUS; thresholds of speeds 1e-6 m/s'),
         'SemiExplicitEuler, PGS': (STEPS, 'the impulse solver PGS')}),
+    'Siconos': ('siconos_peer', 'libsiconos-mechanics-dev', {
+        'Moreau-Jean': (STEPS, 'theta 1/2, Gauss-Seidel and Newton to 1e-12, contacts at exact points'),
+        'Moreau-Jean, projection': (STEPS, 'as before, positions projected onto the constraints')}),
 }
 
 
