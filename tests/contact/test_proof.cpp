@@ -349,6 +349,43 @@ TEST_CASE("the box holds the root from far candidates, or there is none") {
   CHECK(boxes >= 300);
 }
 
+TEST_CASE("what is proven meets the law in ninety digits, within the radius") {
+  random::Generator g(16);
+  int proven = 0;
+  const Digits none("1e-50");  // what rounding of the oracle leaves
+  for (int k = 0; k < 200; ++k) {
+    const double mu = std::pow(10, g.uniform(-1.5, 0.5));
+    const Problem p = random::cluster(g, mu, 3, 2 + k % 4).problem();
+    const VectorXd given = solved(p, k % 2 == 0 ? 1e-9 : 1e-5).impulses;
+    const Proof proof = prove(p, given, 0);
+    if (proof.status != ProofStatus::proven) continue;
+    ++proven;
+    const detail::ProofIsland island = detail::proof_island(p, given);
+    const Column x = exact_root(island, proof.regimes, island.x);
+    REQUIRE(!x.empty());
+    const std::vector<Regime> sticking(at(p.contacts()), Regime::sticking);
+    const Column w = residual(island, sticking, x);
+    INFO(k << ", mu " << mu);
+    for (int i = 0; i < p.contacts(); ++i) {
+      const Digits *xi = &x[at(3 * i)], *wi = &w[at(3 * i)];
+      const Digits length = sqrt(xi[1] * xi[1] + xi[2] * xi[2]), limit = Digits(mu) * xi[0];
+      const Digits slip = sqrt(wi[1] * wi[1] + wi[2] * wi[2]);
+      CHECK(xi[0] >= -none);
+      CHECK(wi[0] >= -none);
+      CHECK(abs(xi[0] * wi[0]) <= none);
+      CHECK(length <= limit + none);
+      if (xi[0] > none) {  // dissipation mu x_n |w_t|, nothing else
+        CHECK(abs(xi[1] * wi[1] + xi[2] * wi[2] + limit * slip) <= none);
+      }
+      Digits squares = 0;
+      for (int r = 3 * i; r < 3 * i + 3; ++r)
+        squares += (x[at(r)] - Digits(island.x[r])) * (x[at(r)] - Digits(island.x[r]));
+      CHECK(sqrt(squares) <= Digits(std::ldexp(proof.radius, -island.impulse[at(i)])) + none);
+    }
+  }
+  CHECK(proven >= 150);
+}
+
 TEST_CASE("boxes hold the root in ninety digits, near and far from it") {
   random::Generator g(13);
   int boxes = 0, none = 0;
