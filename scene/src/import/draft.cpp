@@ -16,8 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kSmallBody = 1e-6;  // of the mass of the body that they carry
-constexpr double kNear = 1e-9;       // m: lines this near to each other meet
+constexpr double kNear = 1e-9;  // m: lines this near to each other meet
 
 using Chain = std::vector<PlacedJoint>;
 
@@ -92,8 +91,8 @@ void name_lost_laws(const LinkJoint& law, bool sprung, Remarks& remarks) {
 /// Whether something acts along the coordinate of a joint, which it needs for that.
 bool has_laws(const PlacedJoint& placed, const ImportOptions& options) {
   const LinkJoint& law = placed.law;
-  return law.damping > 0 || law.stiffness > 0 || law.armature > 0 || law.is_driven || law.mimic ||
-         (options.joint_laws && (law.limits || law.friction > 0));
+  return law.is_summed || law.damping > 0 || law.stiffness > 0 || law.armature > 0 ||
+         law.is_driven || law.mimic || (options.joint_laws && (law.limits || law.friction > 0));
 }
 
 std::string names(const Chain& chain) {
@@ -110,12 +109,9 @@ void add_laws(const PlacedJoint& placed, const ImportOptions& options, Joint& jo
   joint.friction = law.friction;
   if (!law.limits) return;
   const double lower = law.limits->first - placed.value, upper = law.limits->second - placed.value;
-  const bool turns = law.kind == MotionKind::hinge;
-  if (turns && !(upper - lower < 2 * linalg::kPi))
-    return remarks.add("limits of a full turn or more", law.name);
   if (!(lower <= 0 && upper >= 0 && lower < upper))
     return remarks.add("limits that the start is beyond", law.name);
-  joint.limits = JointLimits{lower, upper, 0};
+  if (!has_wide_limits(law)) joint.limits = JointLimits{lower, upper, 0};
 }
 
 void add_single(const PlacedJoint& placed, int first, int second, const ImportOptions& options,
@@ -152,10 +148,7 @@ int add_between(const Part& part, int body, std::size_t number, Draft& draft) {
   Body small;
   small.name = fmt::format("{} joint {}", carried.name, number);
   small.mass = kSmallBody * carried.mass;
-  double about = part.inertia.cwiseAbs().maxCoeff();  // the joints, about which the body turns
-  for (const PlacedJoint& each : part.joints)
-    about += carried.mass * (each.at - carried.position).squaredNorm();
-  small.inertia = kSmallBody * about * Eigen::Matrix3d::Identity();
+  small.inertia = kSmallBody * inertia_about_joints(part) * Eigen::Matrix3d::Identity();
   small.position = carried.position;
   small.orientation = carried.orientation;
   draft.scene.bodies.push_back(std::move(small));
@@ -231,6 +224,19 @@ class Drafting {
         coupling.polynomial = {placed.law.mimic->multiplier};
         draft_.scene.couplings.push_back(std::move(coupling));
       }
+    for (const KeptSum& sum : model_.kept_sums) {
+      Coupling coupling;
+      coupling.name = sum.name;
+      for (const Transmission& term : sum.terms) {
+        coupling.joints.push_back(joint_of(term.joint));
+        coupling.weights.push_back(term.ratio);
+      }
+      if (sum.terms.size() < 2 || any_of(coupling.joints, [](int j) { return j < 0; }))
+        remarks_.add("equalities of tendons with one joint, or of what is no hinge or slider here",
+                     sum.name);
+      else
+        draft_.scene.couplings.push_back(std::move(coupling));
+    }
   }
   void add_ground() {
     if (!options_.ground) return;
@@ -420,6 +426,7 @@ class Drafting {
     each_once(draft_.scene.bodies);
     each_once(draft_.scene.joints);
     each_once(draft_.scene.springs);
+    each_once(draft_.scene.couplings);
   }
 
   const Model& model_;

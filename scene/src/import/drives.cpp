@@ -1,8 +1,7 @@
 // Tether: rotors and actuators of imported joints. SPDX-License-Identifier: BSD-3-Clause
 //
-// Armature a adds a s'^2 / 2 to the kinetic energy, s' being the rate of the joint. That is the
-// energy of a wheel with moment of inertia a about an axis at rest, or of a mass a on a level rail,
-// which turns or slides as the joint does.
+// Armature a adds a q'^2 / 2 to the kinetic energy, q' being the rate of the joint. That is the
+// energy of a mass a on a level rail at rest, which the joint moves by 1 m for a radian or metre.
 //
 // A force f = c - k l - d l' between two bounds, l = r q, is the force r f along q. About the mean
 // m of the bounds it is a constant r m and a drive of a scene, whose bounds are opposite:
@@ -44,35 +43,6 @@ Coordinates coordinates_of(const std::vector<Part>& parts, const Draft& draft) {
       if (const auto found = joints.find(placed.law.name); found != joints.end())
         out.emplace(placed.law.name, PlacedCoordinate{found->second, placed.value, &placed.law});
   return out;
-}
-
-void add_rotor(const PlacedCoordinate& of, Draft& draft) {
-  Scene& scene = draft.scene;
-  const Joint carried = scene.joints[of.joint];
-  Body rotor;
-  rotor.name = "rotor of " + carried.name;
-  rotor.mass = of.law->armature;  // of a hinge: as if 1 m from its axis
-  rotor.inertia = of.law->armature * Eigen::Matrix3d::Identity();
-  rotor.position = carried.at;
-  Joint bearing;
-  bearing.kind = carried.kind;
-  bearing.name = rotor.name;
-  bearing.first = static_cast<int>(scene.bodies.size());
-  bearing.at = carried.at;
-  bearing.axis = carried.axis;
-  if (carried.kind == JointKind::slider)
-    bearing.axis = scene.gravity && scene.gravity->norm() > 0 ? scene.gravity->unitOrthogonal()
-                                                              : Vector3d::UnitX();
-  Coupling coupling;
-  coupling.name = rotor.name;
-  coupling.joints = {static_cast<int>(scene.joints.size()), static_cast<int>(of.joint)};
-  coupling.polynomial = {1};
-  scene.bodies.push_back(std::move(rotor));
-  scene.joints.push_back(std::move(bearing));
-  scene.couplings.push_back(std::move(coupling));
-  const std::string comment = fmt::format("line {}, armature", of.law->line);
-  draft.body_comments.push_back(comment);
-  draft.joint_comments.push_back(comment);
 }
 
 /// Along the coordinate, by loads that are constant in the axes of both bodies: those of a slider
@@ -155,24 +125,61 @@ class Driving {
   Remarks& remarks_;
 };
 
-/// Springs and drives of hinges take the turn that is nearest to their rest, those of MuJoCo all
-/// turns: -k (q - rest) is k (rest - m) - k (q - m), m being the middle between the limits.
-void keep_turns(Joint& joint, Scene& scene, Remarks& remarks) {
-  if (joint.kind != JointKind::hinge) return;
-  const auto keep = [&](double stiffness, double& rest, double bound) {
-    if (!(stiffness > 0)) return;
-    const JointLimits limits = joint.limits.value_or(JointLimits{-kInfinity, kInfinity});
-    if (limits.lower >= rest - linalg::kPi && limits.upper <= rest + linalg::kPi) return;
-    if (!joint.limits || bound < kInfinity)
-      return remarks.add("springs and drives of hinges pull to the nearest of all turns",
-                         joint.name);
-    const double middle = (limits.lower + limits.upper) / 2;
-    add_constant(joint, stiffness * (rest - middle), scene);
-    rest = middle;
-  };
-  if (joint.spring) keep(joint.spring->stiffness, joint.spring->rest, kInfinity);
-  if (joint.motor) keep(joint.motor->stiffness, joint.motor->target, joint.motor->bound);
+/// Whether a hinge leaves the turn in which the angle from `rest` is its own.
+bool leaves_turn(const Joint& hinge, double rest) {
+  return !hinge.limits || hinge.limits->lower < rest - linalg::kPi ||
+         hinge.limits->upper > rest + linalg::kPi;
 }
+
+/// The rotor of a hinge or slider, on a level rail: 1 m for a radian, whose turns it counts. Laws
+/// that need the count are its own.
+class Rotor {
+ public:
+  Rotor(const PlacedCoordinate& of, bool with_limits, Scene& scene)
+      : of_(of), carried_(scene.joints[of.joint]) {
+    if (carried_.kind != JointKind::hinge) return;
+    const auto take = [&](auto& law, double rest, auto& to) {
+      if (!law || !(law->stiffness > 0) || !leaves_turn(carried_, rest)) return;
+      to = law;
+      law.reset();
+    };
+    Joint& joint = scene.joints[of.joint];
+    take(joint.spring, joint.spring ? joint.spring->rest : 0, rail_.spring);
+    take(joint.motor, joint.motor ? joint.motor->target : 0, rail_.motor);
+    const LinkJoint& law = *of.law;
+    if (!with_limits || !has_wide_limits(law)) return;
+    const double lower = law.limits->first - of.value, upper = law.limits->second - of.value;
+    if (lower <= 0 && upper >= 0) rail_.limits = JointLimits{lower, upper, 0};
+  }
+  bool counts() const { return rail_.spring || rail_.motor || rail_.limits; }
+
+  void add(double mass, Draft& draft) {
+    Scene& scene = draft.scene;
+    Body body;
+    body.name = rail_.name = "rotor of " + carried_.name;
+    body.mass = mass;
+    body.inertia = mass * Eigen::Matrix3d::Identity();
+    body.position = rail_.at = carried_.at;
+    rail_.kind = JointKind::slider;
+    rail_.first = static_cast<int>(scene.bodies.size());
+    rail_.axis = scene.gravity && scene.gravity->norm() > 0 ? scene.gravity->unitOrthogonal()
+                                                            : Vector3d::UnitX();
+    Coupling coupling;
+    coupling.name = rail_.name;
+    coupling.joints = {static_cast<int>(scene.joints.size()), static_cast<int>(of_.joint)};
+    coupling.polynomial = {1};
+    scene.bodies.push_back(std::move(body));
+    scene.joints.push_back(std::move(rail_));
+    scene.couplings.push_back(std::move(coupling));
+    const std::string comment = fmt::format("line {}, its coordinate on a rail", of_.law->line);
+    draft.body_comments.push_back(comment);
+    draft.joint_comments.push_back(comment);
+  }
+
+ private:
+  const PlacedCoordinate& of_;
+  Joint carried_, rail_;
+};
 
 }  // namespace
 
@@ -190,15 +197,26 @@ void add_rotors_and_drives(const Model& model, const std::vector<Part>& parts,
   const Coordinates coordinates = coordinates_of(parts, draft);
   Driving driving(coordinates, options, draft, remarks);
   for (const Drive& drive : model.drives) driving.add(drive);
-  for (Joint& joint : draft.scene.joints) keep_turns(joint, draft.scene, remarks);
-  for (const Part& part : parts)
+  for (const Part& part : parts) {
+    if (part.gone) continue;  // its joints are those of another one
     for (const PlacedJoint& placed : part.joints) {
-      if (!(placed.law.armature > 0)) continue;
-      if (const auto found = coordinates.find(placed.law.name); found != coordinates.end())
-        add_rotor(found->second, draft);
-      else
-        remarks.add("armature of what is no hinge or slider here", placed.law.name);
+      const double armature = placed.law.armature;
+      const auto found = coordinates.find(placed.law.name);
+      if (found == coordinates.end()) {
+        if (armature > 0)
+          remarks.add("armature of what is no hinge or slider here", placed.law.name);
+        continue;
+      }
+      Rotor rotor(found->second, options.joint_laws, draft.scene);
+      if (rotor.counts() && !(armature > 0))
+        remarks.add(fmt::format("small bodies that count turns of hinges, for limits, springs and "
+                                "drives ({:g} of the inertia)",
+                                kSmallBody),
+                    placed.law.name);
+      if (rotor.counts() || armature > 0)
+        rotor.add(armature > 0 ? armature : kSmallBody * inertia_about_joints(part), draft);
     }
+  }
 }
 
 }  // namespace tether::scene::import

@@ -36,6 +36,29 @@ void read_joints(Tag& tag, const std::string& name, Model& model) {
   first->mimic = Mimic{second->name, a[1], first->reference + a[0] - a[1] * second->reference};
 }
 
+// The lengths of fixed tendons, y - y0 = a0 + a1 (x - x0), as they start.
+void read_tendons(Tag& tag, const std::string& name, Model& model) {
+  const auto first = model.tendons.find(tag.text("tendon1")),
+             second = model.tendons.find(tag.text("tendon2"));
+  const bool has_second = tag.has("tendon2"), none = first == model.tendons.end();
+  std::vector<double> a = tag.numbers("polycoef", 1, 5);
+  finish(tag, model);
+  if (a.empty()) a = {0, 1};
+  a.resize(5, 0.0);
+  if (none || (has_second && second == model.tendons.end()))
+    return model.remarks.add("equalities of tendons that are not fixed ones", name);
+  if (a[0] != 0 || (has_second && (a[2] != 0 || a[3] != 0 || a[4] != 0)))
+    return model.remarks.add("equalities of tendons with a constant or of degree 2 to 4", name);
+  std::map<std::string, double> ratios;
+  for (const Transmission& each : first->second) ratios[each.joint] += each.ratio;
+  if (has_second)
+    for (const Transmission& each : second->second) ratios[each.joint] -= a[1] * each.ratio;
+  KeptSum out{name, {}};
+  for (const auto& [joint, ratio] : ratios)
+    if (ratio != 0) out.terms.push_back({joint, ratio});
+  model.kept_sums.push_back(std::move(out));
+}
+
 // 0 0 0 and a quaternion of zeros, or nothing: the bodies keep their places.
 bool is_said(const std::vector<double>& place) {
   return place.size() == 7 &&
@@ -66,8 +89,8 @@ void read_closure(Tag& tag, bool weld, const std::string& name, Model& model) {
 }  // namespace
 
 bool read_equality(const Node& node, Model& model, Problems& problems) {
-  const bool weld = is(node, "weld"), joints = is(node, "joint");
-  if (!weld && !joints && !is(node, "connect")) return false;
+  const bool weld = is(node, "weld"), joints = is(node, "joint"), tendons = is(node, "tendon");
+  if (!weld && !joints && !tendons && !is(node, "connect")) return false;
   Tag tag(node, problems);
   const std::string name = tag.has("name") ? tag.name("name", "")
                                            : std::string(node.Name()) + " of " + name_or_line(node);
@@ -75,6 +98,8 @@ bool read_equality(const Node& node, Model& model, Problems& problems) {
     model.remarks.add("equalities that are not active", name);
   else if (joints)
     read_joints(tag, name, model);
+  else if (tendons)
+    read_tendons(tag, name, model);
   else
     read_closure(tag, weld, name, model);
   return true;

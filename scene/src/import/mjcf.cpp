@@ -248,7 +248,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
   const Settings settings = mjcf::read_settings(root, model, problems);
   Reader reader(model, settings, problems);
   bool has_world = false;
-  const mjcf::Tendons tendons = mjcf::read_tendons(root, settings, model, problems);
+  mjcf::read_tendons(root, settings, model, problems);
   std::vector<const Node*> equalities;
   for (const Node* each = root.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
@@ -262,7 +262,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
         if (is(*each, "contact") && is(*part, "exclude"))
           read_excluded(*part, model, problems);
         else if (is(*each, "actuator"))
-          mjcf::read_actuator(*part, settings, tendons, model, problems);
+          mjcf::read_actuator(*part, settings, model, problems);
         else if (is(*each, "equality"))
           equalities.push_back(part);
         else

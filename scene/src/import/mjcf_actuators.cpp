@@ -78,13 +78,14 @@ std::optional<std::pair<double, double>> read_range(Tag& tag, const char* key, c
 }
 
 /// The joints that it pulls; none: it pulls something else.
-std::vector<Transmission> read_transmission(Tag& tag, const Tendons& tendons) {
+std::vector<Transmission> read_transmission(Tag& tag, const Model& model) {
   const std::vector<double> gear = tag.numbers("gear", 1, 6);
   const double ratio = gear.empty() ? 1 : gear[0];
   std::vector<Transmission> out;
   if (tag.has("joint") || tag.has("jointinparent")) {
     out.push_back({tag.text("joint", tag.text("jointinparent")), ratio});
-  } else if (const auto found = tendons.find(tag.text("tendon")); found != tendons.end()) {
+  } else if (const auto found = model.tendons.find(tag.text("tendon"));
+             found != model.tendons.end()) {
     out = found->second;
     for (Transmission& each : out) each.ratio *= ratio;
   }
@@ -93,8 +94,7 @@ std::vector<Transmission> read_transmission(Tag& tag, const Tendons& tendons) {
 
 }  // namespace
 
-Tendons read_tendons(const Node& root, const Settings& settings, Model& model, Problems& problems) {
-  Tendons out;
+void read_tendons(const Node& root, const Settings& settings, Model& model, Problems& problems) {
   for (const Node* section = root.FirstChildElement("tendon"); section != nullptr;
        section = section->NextSiblingElement("tendon"))
     for (const Node* each = section->FirstChildElement(); each != nullptr;
@@ -112,14 +112,12 @@ Tendons read_tendons(const Node& root, const Settings& settings, Model& model, P
       for (const Node* part = each->FirstChildElement("joint"); part != nullptr;
            part = part->NextSiblingElement("joint")) {
         Tag of(*part, problems);
-        out[name].push_back({of.text("joint"), of.number("coef", 1)});
+        model.tendons[name].push_back({of.text("joint"), of.number("coef", 1)});
       }
     }
-  return out;
 }
 
-void read_actuator(const Node& node, const Settings& settings, const Tendons& tendons, Model& model,
-                   Problems& problems) {
+void read_actuator(const Node& node, const Settings& settings, Model& model, Problems& problems) {
   const std::string kind = node.Name();
   Tag own(node, problems);
   const std::string of_class = own.text("class");
@@ -136,7 +134,7 @@ void read_actuator(const Node& node, const Settings& settings, const Tendons& te
     return model.remarks.add(fmt::format("actuators of kind {}", kind), out.name);
   out.control = read_range(tag, "ctrlrange", "ctrllimited", settings);
   out.force = read_range(tag, "forcerange", "forcelimited", settings);
-  out.to = read_transmission(tag, tendons);
+  out.to = read_transmission(tag, model);
   tag.finish(model.remarks, {"name", "class", "group", "user", "tendon", "gaintype", "biastype",
                              "gainprm", "biasprm", "dynprm", "lengthrange"});
   model.drives.push_back(std::move(out));

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <tether/linalg/pi.hpp>
 
 #include "geometry/shape_type.hpp"
 #include "import.hpp"
@@ -291,18 +292,24 @@ void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
 
 }  // namespace
 
-void find_driven(Model& model, const ImportOptions& options) {
-  std::set<std::string> driven;
+/// Marks the joints that need a coordinate for what acts on several.
+void find_common_laws(Model& model, const ImportOptions& options) {
+  std::set<std::string> driven, summed;
   for (const Drive& drive : model.drives)
     for (const Transmission& to : drive.to)
       if (!law_of(drive, options).isZero(0)) driven.insert(to.joint);
+  for (const KeptSum& sum : model.kept_sums)
+    for (const Transmission& term : sum.terms) summed.insert(term.joint);
   for (Link& link : model.links)
-    for (LinkJoint& joint : link.joints) joint.is_driven = driven.count(joint.name) > 0;
+    for (LinkJoint& joint : link.joints) {
+      joint.is_driven = driven.count(joint.name) > 0;
+      joint.is_summed = summed.count(joint.name) > 0;
+    }
 }
 
 std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
   check_names(model, options);
-  find_driven(model, options);
+  find_common_laws(model, options);
   std::vector<LinkStart> out;
   for (const Link& link : model.links) {
     LinkStart start;
@@ -332,6 +339,18 @@ std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
     out.push_back(std::move(start));
   }
   return out;
+}
+
+double inertia_about_joints(const Part& part) {
+  double out = part.inertia.cwiseAbs().maxCoeff();
+  for (const PlacedJoint& each : part.joints)
+    out += part.mass * (each.at - part.pose * part.centre).squaredNorm();
+  return out;
+}
+
+bool has_wide_limits(const LinkJoint& joint) {
+  return joint.kind == MotionKind::hinge && joint.limits &&
+         !(joint.limits->second - joint.limits->first < 2 * linalg::kPi);
 }
 
 std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problems& problems) {

@@ -32,6 +32,15 @@ struct Part {
   std::optional<Touch> touch;
 };
 
+/// Small bodies have this part of the mass or inertia of the one that they carry.
+constexpr double kSmallBody = 1e-6;
+
+/// At most, kg m^2.
+double inertia_about_joints(const Part& part);
+
+/// Limits that the angle of a hinge of scenes, which is one of all turns, does not tell.
+bool has_wide_limits(const LinkJoint& joint);
+
 /// The parts at the start, parents before children. Parts without mass are folded into what hangs
 /// on them, or left out where nothing does. Reports parts that no scene can have. Throws
 /// std::invalid_argument where an option names a joint that is not there, or asks too much of it.

@@ -50,6 +50,7 @@ struct LinkJoint {
   double stiffness = 0, damping = 0;  ///< N/m, N s/m: of slides; N m/rad, N m s: of hinges
   double armature = 0;                ///< kg m^2, kg: inertia of a rotor
   bool is_driven = false;             ///< by an actuator that exerts something
+  bool is_summed = false;             ///< in a kept sum
   double rest = 0;                    ///< of the stiffness
   std::optional<Mimic> mimic;
   int line = 0;
@@ -98,7 +99,7 @@ struct Closure {
   int line = 0;
 };
 
-/// An actuator pulls at a joint with ratio times its force.
+/// The part of a joint in the length of a fixed tendon, or of what an actuator pulls.
 struct Transmission {
   std::string joint;
   double ratio = 1;
@@ -114,6 +115,12 @@ struct Drive {
   int line = 0;
 };
 
+/// The sum of ratio times coordinate keeps its value.
+struct KeptSum {
+  std::string name;
+  std::vector<Transmission> terms;
+};
+
 struct Model {
   std::string name, format;
   std::vector<Link> links;  ///< parents before children
@@ -124,6 +131,8 @@ struct Model {
   bool touches = true;          ///< false: nothing touches anything
   std::vector<Closure> closures;
   std::vector<Drive> drives;
+  std::map<std::string, std::vector<Transmission>> tendons;  ///< fixed ones
+  std::vector<KeptSum> kept_sums;
   std::vector<std::pair<std::string, std::string>> excluded;  ///< names of links that do not
   Remarks remarks;
 };

@@ -108,7 +108,7 @@ Model read_urdf(const Node& root, Problems& problems);
 Model read_mjcf(const Node& root, Problems& problems);
 
 /// Reads an element below <equality> of MJCF: connect and weld become closures, joint becomes a
-/// mimic. False: it is none of them. After all of the joints.
+/// mimic, tendon a kept sum. False: it is none of them. After all joints and tendons.
 bool read_equality(const Node& node, Model& model, Problems& problems);
 
 }  // namespace tether::scene::import

@@ -317,7 +317,22 @@ TEST_CASE("MJCF: loops close by connect and weld, and joints follow each other b
   CHECK(said(with("<connect name='x' body1='none' anchor='0 0 0'/>"),
              "do not move against each other: x"));
   CHECK(said(with("<connect active='false' body1='c' anchor='0 0 0'/>"), "not active"));
-  CHECK(said(with("<tendon tendon1='t'/>"), "<tendon> in <equality>"));
+  const auto summed = [&](const std::string& tendon) {
+    return with(tendon +
+                "</equality><tendon><fixed name='t'><joint joint='ja' coef='2'/>"
+                "<joint joint='jc' coef='-3'/></fixed><fixed name='u'><joint joint='jb' "
+                "coef='1'/></fixed></tendon><equality>");
+  };
+  const Scene sum = mjcf_scene(summed("<tendon name='s' tendon1='t'/>"));
+  REQUIRE(sum.couplings.size() == 1);
+  CHECK(sum.couplings[0].joints == std::vector<int>{0, 2});
+  CHECK(sum.couplings[0].weights == std::vector<double>{2, -3});
+  const Scene two = mjcf_scene(summed("<tendon tendon1='u' tendon2='t' polycoef='0 .5 0 0 0'/>"));
+  REQUIRE(two.couplings.size() == 1);
+  CHECK(two.couplings[0].weights == std::vector<double>{-1, 1, 1.5});
+  CHECK(said(summed("<tendon tendon1='none'/>"), "tendons that are not fixed"));
+  CHECK(said(summed("<tendon name='s' tendon1='u'/>"), "tendons with one joint"));
+  CHECK(said(summed("<tendon tendon1='t' polycoef='1'/>"), "tendons with a constant"));
   CHECK(mjcf_refusal(with("<connect body1='c'/>")).find("anchor") != std::string::npos);
 }
 
@@ -353,7 +368,6 @@ TEST_CASE("MJCF: actuators and armature that scenes lack are named, with what th
                   "</tendon>"),
              "tendons with stiffness, damping, friction, armature or limits: t"));
   CHECK(said(actuator("<motor name='m' joint='h'/>"), "without a force of their own: t"));
-  CHECK(said(actuator("<position name='m' joint='h'/>"), "to the nearest of all turns: h"));
 
   import::ImportOptions options;
   options.controls = {{"m", 3}};
@@ -373,6 +387,33 @@ TEST_CASE("MJCF: actuators and armature that scenes lack are named, with what th
         std::string::npos);
   CHECK(refused("<motor name='m' joint='h' ctrlrange='1 -1'/>").find("ctrlrange") !=
         std::string::npos);
+}
+
+TEST_CASE("MJCF: limits more than a turn apart hold by a body that counts turns") {
+  const std::string text = world(
+      "<body name='a'><joint name='h' axis='0 1 0' range='-100 430'/><geom size='.1' mass='2'/>"
+      "</body>",
+      "<option gravity='0 0 0' timestep='1e-3'/>");
+  CHECK(said(text, "count turns of hinges, for limits, springs and drives (1e-06 of the inertia"));
+  Scene scene = mjcf_scene(text);
+  REQUIRE(scene.joints.size() == 2);
+  CHECK_FALSE(scene.joints[0].limits);
+  const double upper = 430 * kPi / 180;
+  CHECK(scene.joints[1].limits->upper == Approx(upper));
+  // Both turn on until the limit, beyond a turn, and stop in a step before it.
+  scene.bodies[0].angular_velocity.y() = 10;
+  scene.bodies[1].velocity = 10 * scene.joints[1].axis;
+  scene.end = 1;
+  const auto engine = make_engine(scene);
+  engine->advance(0.7);
+  CHECK(engine->bodies()[0].angular_velocity.y() == Approx(10));
+  engine->advance(1);
+  CHECK(engine->bodies()[0].angular_velocity.norm() < 1e-6);
+  const Eigen::AngleAxisd turned(engine->bodies()[0].orientation);
+  CHECK(turned.angle() * turned.axis().y() == Approx(upper - 2 * kPi).margin(0.01));
+  ImportOptions free;
+  free.joint_laws = false;
+  CHECK(mjcf_scene(text, free).joints.size() == 1);
 }
 
 TEST_CASE("MJCF: kinds of actuators share the attributes of their class") {

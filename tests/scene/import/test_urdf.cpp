@@ -307,6 +307,26 @@ TEST_CASE("links without mass: two hinges that cross are a universal joint, thre
   CHECK(scene.bodies.size() == 1);
 }
 
+TEST_CASE("limits beyond a turn of a link without mass are those of what hangs on it") {
+  std::string text = two_links("revolute", "<limit lower='-7' upper='7'/>");
+  const std::string joint =
+      "<joint name='k' type='revolute'><parent link='b'/><child link='c'/>"
+      "<axis xyz='0 1 0'/><limit lower='-8' upper='8'/></joint><link name='c'/></robot>";
+  text.replace(text.find("</robot>"), 8, joint);
+  // The mass of b goes to c.
+  const std::size_t from = text.find("<inertial>"), to = text.find("</inertial>") + 11;
+  const std::string inertial = text.substr(from, to - from);
+  text.erase(from, to - from);
+  text.replace(text.find("<link name='c'/>"), 16, "<link name='c'>" + inertial + "</link>");
+  const Scene scene = scene_of(text);
+  int wide = 0;
+  for (const Joint& each : scene.joints)
+    if (each.kind == JointKind::slider && each.limits) ++wide;
+  CHECK(wide == 2);
+  CHECK(scene.couplings.size() == 2);
+  for (const Body& body : scene.bodies) CHECK(body.mass > 0);
+}
+
 TEST_CASE("a joint without limit moves freely, which is said") {
   const import::Imported made = import_robot(two_links("revolute", ""), "robot.urdf", {});
   CHECK_FALSE(parse_scene(made.toml, "r.toml").joints.front().limits);
