@@ -185,8 +185,7 @@ class Drafting {
       const int on = part.parent < 0 ? -1 : body_of_[static_cast<std::size_t>(part.parent)];
       add_joints(part, body_of_[k], on, options_, draft_, remarks_);
     }
-    add_couplings();
-    add_rotors_and_drives(model_, parts_, options_, draft_, remarks_);
+    add_common_laws(model_, parts_, options_, draft_, remarks_);
     add_closures(model_, parts_, body_of_, draft_, remarks_);
     if (model_.touches) add_contacts();
     make_unique();
@@ -199,45 +198,6 @@ class Drafting {
   }
 
  private:
-  // Joints by name, as add_joints() has them.
-  int joint_of(const std::string& name) const {
-    const std::vector<Joint>& joints = draft_.scene.joints;
-    for (std::size_t j = 0; j < joints.size(); ++j)
-      if (joints[j].name == name &&
-          (joints[j].kind == JointKind::hinge || joints[j].kind == JointKind::slider))
-        return static_cast<int>(j);
-    return -1;
-  }
-  void add_couplings() {
-    for (const Part& part : parts_)
-      for (const PlacedJoint& placed : part.joints) {
-        if (!placed.law.mimic) continue;
-        const int first = joint_of(placed.law.name), second = joint_of(placed.law.mimic->of);
-        if (first < 0 || second < 0 || first == second || placed.law.mimic->multiplier == 0) {
-          remarks_.add("mimic of joints that are not there, or are none of their own here",
-                       placed.law.name);
-          continue;
-        }
-        Coupling coupling;
-        coupling.name = fmt::format("mimic {}", draft_.scene.couplings.size() + 1);
-        coupling.joints = {first, second};
-        coupling.polynomial = {placed.law.mimic->multiplier};
-        draft_.scene.couplings.push_back(std::move(coupling));
-      }
-    for (const KeptSum& sum : model_.kept_sums) {
-      Coupling coupling;
-      coupling.name = sum.name;
-      for (const Transmission& term : sum.terms) {
-        coupling.joints.push_back(joint_of(term.joint));
-        coupling.weights.push_back(term.ratio);
-      }
-      if (sum.terms.size() < 2 || any_of(coupling.joints, [](int j) { return j < 0; }))
-        remarks_.add("equalities of tendons with one joint, or of what is no hinge or slider here",
-                     sum.name);
-      else
-        draft_.scene.couplings.push_back(std::move(coupling));
-    }
-  }
   void add_ground() {
     if (!options_.ground) return;
     Body body;

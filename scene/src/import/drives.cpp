@@ -1,4 +1,4 @@
-// Tether: rotors and actuators of imported joints. SPDX-License-Identifier: BSD-3-Clause
+// Tether: couplings, actuators and rotors of imported joints. SPDX-License-Identifier: BSD-3-Clause
 //
 // Armature a adds a q'^2 / 2 to the kinetic energy, q' being the rate of the joint. That is the
 // energy of a mass a on a level rail at rest, which the joint moves by 1 m for a radian or metre.
@@ -29,6 +29,14 @@ struct PlacedCoordinate {
 };
 using Coordinates = std::map<std::string, PlacedCoordinate>;
 
+// f(part, joint) for each joint of the draft.
+template <class F>
+void each_joint(const std::vector<Part>& parts, const F& f) {
+  for (const Part& part : parts)
+    if (!part.gone)  // else its joints are those of another one
+      for (const PlacedJoint& placed : part.joints) f(part, placed);
+}
+
 bool has_coordinate(const Joint& joint) {
   return joint.kind == JointKind::hinge || joint.kind == JointKind::slider;
 }
@@ -38,11 +46,51 @@ Coordinates coordinates_of(const std::vector<Part>& parts, const Draft& draft) {
   for (std::size_t j = 0; j < draft.scene.joints.size(); ++j)
     if (has_coordinate(draft.scene.joints[j])) joints.emplace(draft.scene.joints[j].name, j);
   Coordinates out;
-  for (const Part& part : parts)
-    for (const PlacedJoint& placed : part.joints)
-      if (const auto found = joints.find(placed.law.name); found != joints.end())
-        out.emplace(placed.law.name, PlacedCoordinate{found->second, placed.value, &placed.law});
+  each_joint(parts, [&](const Part&, const PlacedJoint& placed) {
+    if (const auto found = joints.find(placed.law.name); found != joints.end())
+      out.emplace(placed.law.name, PlacedCoordinate{found->second, placed.value, &placed.law});
+  });
   return out;
+}
+
+/// The joints of these ratios, of one each, as a coupling; null: one of them is not there.
+std::optional<Coupling> coupling_of(const std::vector<Transmission>& terms,
+                                    const Coordinates& coordinates) {
+  Coupling out;
+  for (const Transmission& term : terms) {
+    const auto found = coordinates.find(term.joint);
+    if (found == coordinates.end() || term.ratio == 0) return {};
+    out.joints.push_back(static_cast<int>(found->second.joint));
+    out.weights.push_back(term.ratio);
+  }
+  return out.joints.size() < 2 ? std::nullopt : std::optional<Coupling>(out);
+}
+
+void add_couplings(const Model& model, const std::vector<Part>& parts,
+                   const Coordinates& coordinates, Scene& scene, Remarks& remarks) {
+  each_joint(parts, [&](const Part&, const PlacedJoint& placed) {
+    if (!placed.law.mimic) return;
+    const Mimic& mimic = *placed.law.mimic;
+    std::optional<Coupling> coupling =
+        coupling_of({{placed.law.name, 1}, {mimic.of, mimic.multiplier}}, coordinates);
+    if (!coupling || mimic.of == placed.law.name)
+      return remarks.add("mimic of joints that are not there, or are none of their own here",
+                         placed.law.name);
+    coupling->name = fmt::format("mimic {}", scene.couplings.size() + 1);
+    coupling->weights.clear();
+    coupling->polynomial = {mimic.multiplier};
+    scene.couplings.push_back(std::move(*coupling));
+  });
+  for (const KeptSum& sum : model.kept_sums) {
+    std::optional<Coupling> coupling = coupling_of(sum.terms, coordinates);
+    if (!coupling) {
+      remarks.add("equalities of tendons with one joint, or of what is no hinge or slider here",
+                  sum.name);
+      continue;
+    }
+    coupling->name = sum.name;
+    scene.couplings.push_back(std::move(*coupling));
+  }
 }
 
 /// Along the coordinate, by loads that are constant in the axes of both bodies: those of a slider
@@ -192,31 +240,28 @@ Eigen::Vector3d law_of(const Drive& drive, const ImportOptions& options) {
   return drive.has_activation ? drive.bias : Vector3d(control * drive.gain + drive.bias);
 }
 
-void add_rotors_and_drives(const Model& model, const std::vector<Part>& parts,
-                           const ImportOptions& options, Draft& draft, Remarks& remarks) {
+void add_common_laws(const Model& model, const std::vector<Part>& parts,
+                     const ImportOptions& options, Draft& draft, Remarks& remarks) {
   const Coordinates coordinates = coordinates_of(parts, draft);
+  add_couplings(model, parts, coordinates, draft.scene, remarks);
   Driving driving(coordinates, options, draft, remarks);
   for (const Drive& drive : model.drives) driving.add(drive);
-  for (const Part& part : parts) {
-    if (part.gone) continue;  // its joints are those of another one
-    for (const PlacedJoint& placed : part.joints) {
-      const double armature = placed.law.armature;
-      const auto found = coordinates.find(placed.law.name);
-      if (found == coordinates.end()) {
-        if (armature > 0)
-          remarks.add("armature of what is no hinge or slider here", placed.law.name);
-        continue;
-      }
-      Rotor rotor(found->second, options.joint_laws, draft.scene);
-      if (rotor.counts() && !(armature > 0))
-        remarks.add(fmt::format("small bodies that count turns of hinges, for limits, springs and "
-                                "drives ({:g} of the inertia)",
-                                kSmallBody),
-                    placed.law.name);
-      if (rotor.counts() || armature > 0)
-        rotor.add(armature > 0 ? armature : kSmallBody * inertia_about_joints(part), draft);
+  each_joint(parts, [&](const Part& part, const PlacedJoint& placed) {
+    const double armature = placed.law.armature;
+    const auto found = coordinates.find(placed.law.name);
+    if (found == coordinates.end()) {
+      if (armature > 0) remarks.add("armature of what is no hinge or slider here", placed.law.name);
+      return;
     }
-  }
+    Rotor rotor(found->second, options.joint_laws, draft.scene);
+    if (rotor.counts() && !(armature > 0))
+      remarks.add(fmt::format("small bodies that count turns of hinges, for limits, springs and "
+                              "drives ({:g} of the inertia)",
+                              kSmallBody),
+                  placed.law.name);
+    if (rotor.counts() || armature > 0)
+      rotor.add(armature > 0 ? armature : kSmallBody * inertia_about_joints(part), draft);
+  });
 }
 
 }  // namespace tether::scene::import

@@ -55,9 +55,9 @@ struct Draft {
 /// The force of an actuator is (1, length, speed) . this, before its bounds.
 Eigen::Vector3d law_of(const Drive& drive, const ImportOptions& options);
 
-/// Adds a body for the armature of each hinge and slider, and what actuators exert.
-void add_rotors_and_drives(const Model& model, const std::vector<Part>& parts,
-                           const ImportOptions& options, Draft& draft, Remarks& remarks);
+/// Adds couplings, what actuators exert, and bodies for the armature of hinges and sliders.
+void add_common_laws(const Model& model, const std::vector<Part>& parts,
+                     const ImportOptions& options, Draft& draft, Remarks& remarks);
 
 /// Adds the joints that carry `part`, which is the body `body`, on the body `on` (-1: the world).
 /// Several joints without laws are one where scenes have it (universal, ball, planar, none), else
