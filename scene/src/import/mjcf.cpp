@@ -4,8 +4,10 @@
 // several moves by them in turn. Things of the world that touch become links of their own.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <tether/linalg/symmetric_eigen.hpp>
 
+#include "bounds.hpp"
 #include "mjcf_actuators.hpp"
 #include "mjcf_geom.hpp"
 
@@ -19,6 +21,14 @@ using mjcf::Geom;
 using mjcf::InertiaFrom;
 using mjcf::Settings;
 
+/// What elements have of those around them: a class, and of <frame> and <replicate> a place in the
+/// frame of their link and an end of their names.
+struct Around {
+  std::string class_name;
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  std::string suffix = {};
+};
+
 class Reader {
  public:
   Reader(Model& model, const Settings& settings, Problems& problems)
@@ -26,15 +36,17 @@ class Reader {
 
   void world(const Node& node) {
     Tag tag(node, problems_);
-    children(node, -1, tag.text("childclass"));
+    children(node, -1, {tag.text("childclass")});
     tag.finish(model_.remarks, {"name"});
   }
 
  private:
-  void children(const Node& node, int link, const std::string& class_name);
-  void body(const Node& node, int parent, const std::string& around);
-  void joint(const Node& node, int link, const std::string& class_name);
-  void geom(const Node& node, int link, const std::string& class_name);
+  void children(const Node& node, int link, const Around& around);
+  void frame(const Node& node, int link, Around around);
+  void replicate(const Node& node, int link, const Around& around);
+  void body(const Node& node, int parent, const Around& around);
+  void joint(const Node& node, int link, const Around& around);
+  void geom(const Node& node, int link, const Around& around);
   void inertial(const Node& node, int link);
   void take_name(int line, const std::string& name, const char* kind, std::set<std::string>& names);
   Link& link(int k) { return model_.links[static_cast<std::size_t>(k)]; }
@@ -43,7 +55,8 @@ class Reader {
   const Settings& settings_;
   Problems& problems_;
   std::set<std::string> bodies_, joints_;
-  std::set<int> weighed_;  // links that <inertial> gives mass
+  std::set<int> weighed_;     // links that <inertial> gives mass
+  std::size_t repeated_ = 0;  // bodies and geoms of <replicate>
 };
 
 void Reader::take_name(int line, const std::string& name, const char* kind,
@@ -53,26 +66,29 @@ void Reader::take_name(int line, const std::string& name, const char* kind,
                   fmt::format("another {} has it already", kind));
 }
 
-void Reader::children(const Node& node, int of, const std::string& class_name) {
+void Reader::children(const Node& node, int of, const Around& around) {
   // Geoms last: whether they give mass is known then.
   for (const Node* each = node.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
     if (of >= 0 && (is(*each, "joint") || is(*each, "freejoint")))
-      joint(*each, of, class_name);
+      joint(*each, of, around);
     else if (of >= 0 && is(*each, "inertial"))
       inertial(*each, of);
   }
   for (const Node* each = node.FirstChildElement("geom"); each != nullptr;
        each = each->NextSiblingElement("geom"))
-    geom(*each, of, class_name);
+    geom(*each, of, around);
   for (const Node* each = node.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
     if (is(*each, "body")) {
-      body(*each, of, class_name);
+      body(*each, of, around);
+    } else if (is(*each, "frame")) {
+      frame(*each, of, around);
+    } else if (is(*each, "replicate")) {
+      replicate(*each, of, around);
     } else if (is(*each, "light") || is(*each, "camera") || is(*each, "site")) {
       model_.remarks.add(fmt::format("<{}>", each->Name()));
-    } else if (is(*each, "frame") || is(*each, "replicate") || is(*each, "composite") ||
-               is(*each, "flexcomp") || is(*each, "attach")) {
+    } else if (is(*each, "composite") || is(*each, "flexcomp") || is(*each, "attach")) {
       problems_.add(each->GetLineNum(), path(*each), "",
                     "is not read; MuJoCo writes the model without it (mj_saveLastXML, or save in "
                     "its viewer)");
@@ -84,32 +100,71 @@ void Reader::children(const Node& node, int of, const std::string& class_name) {
   }
 }
 
-void Reader::body(const Node& node, int parent, const std::string& around) {
+void Reader::frame(const Node& node, int of, Around around) {
   Tag tag(node, problems_);
+  const Vector3d at = tag.vector("pos", Vector3d::Zero());
+  around.frame = around.frame * placed(mjcf::read_orientation(tag, settings_), at);
+  around.class_name = tag.text("childclass", around.class_name);
+  tag.finish(model_.remarks, {"name"});
+  children(node, of, around);
+}
+
+/// As in MuJoCo copy k is turned by k times the angles, and lies by the offset of copy k - 1 from
+/// that; its number has the digits of the count.
+void Reader::replicate(const Node& node, int of, const Around& around) {
+  Tag tag(node, problems_);
+  const double count = tag.positive("count", 1);
+  if (count != std::floor(count) || count > kMostListed)
+    return tag.wrong("count", fmt::format("must be a whole number of at most {}", kMostListed));
+  const Vector3d offset = tag.vector("offset", Vector3d::Zero()),
+                 angles = tag.vector("euler", Vector3d::Zero());
+  Around copy = around;
+  copy.class_name = tag.text("childclass", around.class_name);
+  const std::string separator = tag.text("sep");
+  tag.finish(model_.remarks);
+  const std::size_t digits = fmt::format("{}", count).size();
+  Vector3d at = Vector3d::Zero();
+  for (int k = 0; k < count && problems_.clean(); ++k) {
+    const Eigen::Quaterniond turn = mjcf::from_euler(k * angles, settings_);
+    copy.frame = around.frame * placed(turn, at);
+    copy.suffix = fmt::format("{}{:0{}}", separator, k, digits) + around.suffix;
+    at += turn * offset;
+    children(node, of, copy);
+    if (++repeated_ > kMostListed)
+      problems_.add(node.GetLineNum(), path(node), "",
+                    fmt::format("all copies have at most {} bodies and geoms", kMostListed));
+  }
+}
+
+void Reader::body(const Node& node, int parent, const Around& around) {
+  Tag tag(node, problems_);
+  if (!around.suffix.empty() && ++repeated_ > kMostListed) return;
   Link out;
   out.line = tag.line();
   out.parent = parent;
-  out.name = tag.has("name") ? tag.name("name", "") : fmt::format("body {}", bodies_.size() + 1);
+  out.name = tag.has("name") ? tag.name("name", "") + around.suffix
+                             : fmt::format("body {}", bodies_.size() + 1);
   take_name(out.line, out.name, "body", bodies_);
   const Vector3d at = tag.vector("pos", Vector3d::Zero());
-  out.pose = placed(mjcf::read_orientation(tag, settings_), at);
-  const std::string class_name = tag.text("childclass", around);
+  out.pose = around.frame * placed(mjcf::read_orientation(tag, settings_), at);
+  const Around inside{tag.text("childclass", around.class_name), Eigen::Isometry3d::Identity(),
+                      around.suffix};
   tag.finish(model_.remarks, {"user"});
   const int index = static_cast<int>(model_.links.size());
   model_.links.push_back(std::move(out));
-  children(node, index, class_name);
+  children(node, index, inside);
 }
 
-void Reader::joint(const Node& node, int of, const std::string& class_name) {
+void Reader::joint(const Node& node, int of, const Around& around) {
   const bool is_freejoint = is(node, "freejoint");
   Tag own(node, problems_);
-  Tag tag(
-      node, problems_,
-      is_freejoint ? nullptr : settings_.defaults(node, own.text("class", class_name), problems_));
+  Tag tag(node, problems_,
+          is_freejoint ? nullptr
+                       : settings_.defaults(node, own.text("class", around.class_name), problems_));
   LinkJoint out;
   out.line = tag.line();
   out.name = tag.has("name")
-                 ? tag.name("name", "")
+                 ? tag.name("name", "") + around.suffix
                  : fmt::format("joint {} of {}", link(of).joints.size() + 1, link(of).name);
   take_name(out.line, out.name, "joint", joints_);
   const std::string type = is_freejoint ? "free" : tag.text("type", "hinge");
@@ -123,8 +178,8 @@ void Reader::joint(const Node& node, int of, const std::string& class_name) {
     problems_.add(out.line, path(node), "", "a free joint is of bodies in the world only");
   const bool turns = out.kind == MotionKind::hinge;
   const auto value = [&](double x) { return turns ? settings_.angle(x) : x; };
-  out.axis = tag.direction("axis", Vector3d::UnitZ());
-  out.at = tag.vector("pos", Vector3d::Zero());
+  out.axis = around.frame.linear() * tag.direction("axis", Vector3d::UnitZ());
+  out.at = around.frame * tag.vector("pos", Vector3d::Zero());
   out.reference = value(tag.number("ref", 0));
   out.rest = value(tag.number("springref", 0));
   out.stiffness = tag.not_negative("stiffness", 0);
@@ -167,14 +222,27 @@ void Reader::inertial(const Node& node, int of) {
   tag.finish(model_.remarks);
 }
 
-void Reader::geom(const Node& node, int of, const std::string& class_name) {
-  Geom geom = mjcf::read_geom(node, class_name, settings_, problems_, model_.remarks);
+void move(const Eigen::Isometry3d& frame, Geom& geom) {
+  if (frame.matrix() == Eigen::Matrix4d::Identity()) return;  // would only add rounding
+  const Matrix3d R = frame.linear(), turned = R * geom.inertia * R.transpose();
+  geom.centre = frame * geom.centre;
+  geom.inertia = (turned + turned.transpose()) / 2;
+  if (!geom.shape) return;
+  geom.shape->position = frame * geom.shape->position;
+  geom.shape->orientation = Eigen::Quaterniond(R) * geom.shape->orientation;
+}
+
+void Reader::geom(const Node& node, int of, const Around& around) {
+  if (!around.suffix.empty() && ++repeated_ > kMostListed) return;
+  Geom geom = mjcf::read_geom(node, around.class_name, settings_, problems_, model_.remarks);
+  move(around.frame, geom);
   const bool plane = geom.shape && geom.shape->kind == ShapeKind::plane;
   if (of < 0) {  // of the world
     if (!geom.shape) return;
     Link out;
     out.line = node.GetLineNum();
-    out.name = geom.name.empty() ? fmt::format("geom of line {}", out.line) : geom.name;
+    out.name =
+        geom.name.empty() ? fmt::format("geom of line {}", out.line) : geom.name + around.suffix;
     out.scenery = true;
     out.shapes.push_back(std::move(*geom.shape));
     if (geom.touches) out.touch = geom.touch;

@@ -109,18 +109,6 @@ void read_class(const Node& node, const std::string* around, Settings& out, Prob
     read_class(*each, &name, out, problems, remarks);
 }
 
-Quaterniond from_euler(const Vector3d& angles, const std::string& sequence) {
-  Quaterniond out = Quaterniond::Identity();
-  for (int k = 0; k < 3; ++k) {
-    const char letter = sequence[static_cast<std::size_t>(k)];
-    const bool fixed = letter < 'a';
-    const Vector3d axis = Vector3d::Unit(letter - (fixed ? 'X' : 'x'));
-    const Quaterniond turn(AngleAxisd(angles[k], axis));
-    out = fixed ? turn * out : out * turn;
-  }
-  return out;
-}
-
 }  // namespace
 
 const Attributes* Settings::defaults(const Node& node, const std::string& name, Problems& problems,
@@ -187,6 +175,18 @@ Settings read_settings(const Node& root, Model& model, Problems& problems) {
   return out;
 }
 
+Quaterniond from_euler(const Vector3d& angles, const Settings& settings) {
+  Quaterniond out = Quaterniond::Identity();
+  for (int k = 0; k < 3; ++k) {
+    const char letter = settings.euler[static_cast<std::size_t>(k)];
+    const bool fixed = letter < 'a';
+    const Vector3d axis = Vector3d::Unit(letter - (fixed ? 'X' : 'x'));
+    const Quaterniond turn(AngleAxisd(settings.angle(angles[k]), axis));
+    out = fixed ? turn * out : out * turn;
+  }
+  return out;
+}
+
 Quaterniond read_orientation(Tag& tag, const Settings& settings) {
   if (const auto q = tag.numbers("quat", 4, 4); !q.empty()) {
     const Quaterniond read(q[0], q[1], q[2], q[3]);
@@ -198,8 +198,7 @@ Quaterniond read_orientation(Tag& tag, const Settings& settings) {
       return Quaterniond(AngleAxisd(settings.angle(a[3]), axis.stableNormalized()));
     tag.wrong("axisangle", "must have an axis that is not zero");
   } else if (const auto e = tag.numbers("euler", 3, 3); !e.empty()) {
-    return from_euler({settings.angle(e[0]), settings.angle(e[1]), settings.angle(e[2])},
-                      settings.euler);
+    return from_euler({e[0], e[1], e[2]}, settings);
   } else if (const auto v = tag.numbers("xyaxes", 6, 6); !v.empty()) {
     const Vector3d x = Vector3d(v[0], v[1], v[2]).stableNormalized();
     const Vector3d y = Vector3d(v[3], v[4], v[5]).stableNormalized();

@@ -36,6 +36,9 @@ struct Settings {
                              std::string_view element = {}) const;
 };
 
+/// Angles in the unit and sequence of the file.
+Eigen::Quaterniond from_euler(const Eigen::Vector3d& angles, const Settings& settings);
+
 /// One of quat, axisangle, euler, xyaxes, zaxis; none: the identity.
 Eigen::Quaterniond read_orientation(Tag& tag, const Settings& settings);
 

@@ -261,6 +261,45 @@ TEST_CASE("MJCF: nothing touches where the file disables contacts") {
   CHECK(mjcf_scene(world(bodies, "<option><flag contact='disable'/></option>")).pairs.empty());
 }
 
+TEST_CASE("MJCF: frames place what is in them, and replicas follow each other") {
+  const std::string geom = "<geom type='box' size='.1 .2 .3' pos='.1 0 0' mass='2'/>";
+  const std::string inner = "<joint name='j' axis='0 1 0' pos='0 .1 0'/>" + geom;
+  const Scene plain =
+      mjcf_scene(world("<body name='b' pos='3 2 1' euler='0 0 90'>" + inner + "</body>"));
+  // Three turns of 30 degrees about z, each in the axes of the one around it, and the places.
+  const Scene framed = mjcf_scene(
+      world("<frame pos='3 1 1' euler='0 0 30'><frame euler='0 0 30'><body name='b' pos='"
+            "0.8660254037844386 0.5 0' euler='0 0 30'>" +
+            inner + "</body></frame></frame>"));
+  CHECK((plain.bodies[0].position - framed.bodies[0].position).norm() < 1e-14);
+  CHECK((plain.joints[0].axis - framed.joints[0].axis).norm() < 1e-14);
+  CHECK((plain.joints[0].at - framed.joints[0].at).norm() < 1e-14);
+  // Within a body: geoms and joints.
+  const Scene turned = mjcf_scene(
+      world("<body name='b' pos='3 2 1'><frame euler='0 0 90'>" + inner + "</frame></body>"));
+  const Eigen::Matrix3d R(plain.bodies[0].orientation);
+  CHECK((plain.bodies[0].position - turned.bodies[0].position).norm() < 1e-14);
+  CHECK((R * plain.bodies[0].inertia * R.transpose() - turned.bodies[0].inertia).norm() < 1e-14);
+  CHECK((plain.joints[0].axis - turned.joints[0].axis).norm() < 1e-14);
+
+  const Scene ring =
+      mjcf_scene(world("<replicate count='12' offset='1 0 0' euler='0 0 30' sep='-'>"
+                       "<body name='b'>" +
+                       inner + "</body></replicate>"));
+  REQUIRE(ring.bodies.size() == 12);
+  CHECK(ring.bodies[0].name == "b-00");
+  CHECK(ring.joints[11].name == "j-11");
+  // A polygon of twelve sides of 1 m: the offset of each copy is turned as that copy.
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 12; ++k) {
+    const Eigen::AngleAxisd turn(k * kPi / 6, Eigen::Vector3d::UnitZ());
+    const Body& body = ring.bodies[static_cast<std::size_t>(k)];
+    CHECK((body.position - at - turn * Eigen::Vector3d(0.1, 0, 0)).norm() < 1e-13);
+    at += turn * Eigen::Vector3d::UnitX();
+  }
+  CHECK(at.norm() < 1e-13);
+}
+
 TEST_CASE("MJCF: balanceinertia replaces the moments that no body has by their mean") {
   const std::string body =
       "<body name='b'><freejoint/><inertial mass='1' pos='0 0 0' diaginertia='1 1 3'/></body>"
@@ -449,7 +488,11 @@ TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with
   refused(world("<body><joint/><geom type='plane'/></body>"), "in the world only");
   refused(world("<body><joint class='none'/><geom size='1'/></body>"), "no <default>");
   refused(world("<body name='a'/><body name='a'/>"), "another body");
-  refused(world("<replicate count='9'/>"), "is not read");
+  refused(world("<composite type='grid'/>"), "is not read");
+  refused(world("<replicate count='1.5'/>"), "whole number");
+  refused(
+      world("<replicate count='90000'><replicate count='90000'><body/></replicate></replicate>"),
+      "all copies have at most 100000 bodies and geoms");
   refused(world("<include file='x'/>"), "no such file");
   refused(world("", "<compiler coordinate='global'/>"), "must be local");
   refused(world("<body><joint/><geom size='1' quat='0 0 0 0'/></body>"), "quat");
