@@ -1,4 +1,4 @@
-// Tether: intervals that hold in any rounding of doubles. SPDX-License-Identifier: BSD-3-Clause
+// Tether: intervals of doubles, rounded to nearest. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <algorithm>
