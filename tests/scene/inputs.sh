@@ -47,7 +47,7 @@ END
 }
 
 make
-for option in csv svg html state; do
+for option in csv svg html certificate state; do
   refused s.toml run s.toml --quiet --$option s.toml
   refused s.toml run s.toml --quiet --$option hard
   refused a.lock run a.lock --quiet --$option a

@@ -1,99 +1,187 @@
 #!/usr/bin/env python3
-"""Does scene/tools/verify.py pass records as they are, and find a hundred planted faults? SPDX-License-Identifier: BSD-3-Clause
+"""Do both judges pass certificates as they are, and find a hundred planted faults? SPDX-License-Identifier: BSD-3-Clause
 
     verify_faults.py TETHER SCENES"""
-import argparse
-import copy
+import math
 import pathlib
 import random
+import subprocess
 import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scene" / "tools"))
 import verify  # noqa: E402
 
-SCENES = {"rolling_sphere": 0.1, "incline": 0.1, "icy_wedge": 0.05, "stack": 1.0, "cart": 0.05}
+SCENES = {"rolling_sphere": 0.02, "icy_wedge": 0.01, "stack": 0.1, "cart": 0.02, "gripper": 0.02, "pulled_block": 0.2, "bricard": 0.2,
+          "clearance": 0.002}
+PART = 1e-3  # of a number: what a small fault changes
 
 
-def choose(random_, records):
-    """A record with contacts as the one before has, and one of its contacts that pushes."""
-    settled = [k for k in range(2, len(records)) if len(records[k]["contacts"]) == len(records[k - 1]["contacts"]) > 0]
-    record = records[random_.choice(settled)]
-    return record, random_.choice([c for c in record["contacts"] if verify.dot(c["force"], c["normal"]) > 1e-3])
+def pick(random_, lines, word, where=lambda n: True):
+    """Index and numbers of a line of this word."""
+    found = [k for k, line in enumerate(lines) if line.split(" ", 1)[0] == word and where(numbers(line))]
+    k = random_.choice(found)
+    return k, numbers(lines[k])
 
 
-def off_the_cone(random_, scene, records):
-    _, contact = choose(random_, records)
-    push = verify.dot(contact["force"], contact["normal"])
-    across = [1, 0, 0] if abs(contact["normal"][0]) < 0.5 else [0, 1, 0]
-    across = verify.add(across, contact["normal"], -verify.dot(across, contact["normal"]))
-    mu = scene.coefficient(contact["first"], contact["second"])
-    size = (2 + random_.random()) * mu * push + 1e-3 * push
-    contact["force"] = verify.add(contact["force"], across, size / verify.norm(across))
+def numbers(line):
+    out = []
+    for field in line.split(" ")[1:]:
+        try:
+            out.append(float(field))
+        except ValueError:
+            break
+    return out
 
 
-def swapped_sign(random_, scene, records):
-    _, contact = choose(random_, records)
-    contact["force"] = [-x for x in contact["force"]]
+def put(lines, k, n):
+    fields = lines[k].rstrip("\n").split(" ")
+    lines[k] = " ".join([fields[0], *(repr(x) for x in n), *fields[1 + len(n):]]) + "\n"
 
 
-def drift(random_, scene, records):
-    start = random_.randrange(2, len(records))
-    name, axis = random_.choice(sorted(records[0]["bodies"])), random_.randrange(3)
-    for record in records[start:]:
-        record["bodies"][name]["x"][axis] += 1e-3
+def pressed(n):
+    return verify.norm(n[16:19]) > 0.1 * PRESS
 
 
-def lost_impulse(random_, scene, records):
-    _, contact = choose(random_, records)
-    contact["force"] = [0.99 * x for x in contact["force"]]
+PRESS = 0.0  # the largest impulse or force of a contact of the certificate
 
 
-def broken_inputs(program, scenes):
-    """Files that are no scene and no record are told so; what is accepted of them."""
-    good, accepted = (pathlib.Path(scenes) / "incline.toml").read_text(), []
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        (folder / "incline.toml").write_text(good)
-        table = pathlib.Path(verify.record(folder / "incline.toml", good, program, 0.01, folder))
-        (folder / "cut.csv").write_text(table.read_text()[:-30])
-        (folder / "other.csv").write_text("a,b\n1,2\n")
-        (folder / "cut.toml").write_text(good[:100])
-        for scene, record in (("cut.toml", None), ("missing.toml", None), ("incline.toml", "cut.csv"), ("incline.toml", "other.csv"),
-                              ("incline.toml", "missing.csv")):
-            given = argparse.Namespace(csv=record and str(folder / record), tether=program, end=0.01)
-            code, reason = verify.verify(folder / scene, given)
-            if code != 2 or not isinstance(reason, str):
-                accepted.append(f"{scene} with {record}")
-    return accepted
+def off_the_cone(random_, lines):
+    k, n = pick(random_, lines, "contact", pressed)
+    n[16:19] = verify.add(n[16:19], verify.across(n[8:11]), 3 * verify.norm(n[16:19]))
+    put(lines, k, n)
+
+
+def swapped_sign(random_, lines):
+    k, n = pick(random_, lines, "contact", pressed)
+    n[16:19] = verify.scaled(n[16:19], -1)
+    put(lines, k, n)
+
+
+def turned_friction(random_, lines):
+    def rubs(n):
+        return verify.norm(verify.add(n[16:19], n[8:11], -verify.dot(n[16:19], n[8:11]))) > 1e-2 * PRESS
+    k, n = pick(random_, lines, "contact", rubs)
+    push = verify.dot(n[16:19], n[8:11])
+    along = verify.add(n[16:19], n[8:11], -push)
+    n[16:19] = verify.add(verify.scaled(n[8:11], push), verify.cross(n[8:11], along))
+    put(lines, k, n)
+
+
+def weaker_contact(random_, lines):
+    k, n = pick(random_, lines, "contact", pressed)
+    n[16:19] = verify.scaled(n[16:19], 1 - PART)
+    put(lines, k, n)
+
+
+def lost_contact(random_, lines):
+    k, n = pick(random_, lines, "contact", pressed)
+    n[16:19] = [0.0] * 3
+    put(lines, k, n)
+
+
+def other_mass(random_, lines):
+    k, n = pick(random_, lines, "body", lambda n: n[1] > 0)
+    n[1] *= 1 + PART
+    put(lines, k, n)
+
+
+def shifted(random_, lines):
+    k, n = pick(random_, lines[20:], "to")
+    n[1 + random_.randrange(3)] += PART * (1 + random_.random())
+    put(lines, k + 20, n)
+
+
+def faster(random_, lines):
+    k, n = pick(random_, lines[20:], "to")
+    n[8 + random_.randrange(3)] += 10 * PART * (1 + random_.random())
+    put(lines, k + 20, n)
+
+
+def joints_pull(random_, lines):
+    k, n = pick(random_, lines, "pull", lambda n: verify.norm(n[2:5]) > 0.1 * PULL)
+    n[2 + max(range(3), key=lambda i: abs(n[2 + i]))] *= 1 + PART
+    put(lines, k, n)
+
+
+PULL = 0.0  # the largest of a joint
+
+
+def residual_claimed(random_, lines):
+    k, n = pick(random_, lines, "part")
+    n[3] += 1e-3
+    put(lines, k, n)
+
+
+def lost_push(random_, lines):
+    k, _ = pick(random_, lines, "push")
+    del lines[k]
+    lines[-1] = f"end {len(lines) - 1}\n"
+
+
+def turned_body(random_, lines):
+    k, n = pick(random_, lines[20:], "to")
+    n[4:8] = verify.times(verify.rotation([0.01, 0.0, 0.0]), n[4:8])
+    put(lines, k + 20, n)
+
+
+FAULTS = (off_the_cone, swapped_sign, turned_friction, weaker_contact, lost_contact, other_mass, shifted, faster, joints_pull,
+          residual_claimed, lost_push, turned_body)
+
+
+def judged(program, file, lines):
+    """Exit codes of both judges."""
+    file.write_text("".join(lines))
+    first = subprocess.run([program, "verify", str(file)], capture_output=True).returncode
+    second = subprocess.run([sys.executable, verify.__file__, str(file)], capture_output=True).returncode
+    return first, second
+
+
+def damaged(random_, program, file, lines):
+    """What is cut, or of wild bytes, is no certificate; what is accepted of it, or crashes."""
+    text, bad = "".join(lines), []
+    for wrong in ("", text[:-5], text[: len(text) // 2], "tether certificate 1\n", text.replace("engine", "motor", 1), text + "to 0\n",
+                  text.replace("to 1 ", "to 77 "), text.replace("\npart", "\nlaw")):
+        if judged(program, file, [wrong]) != (2, 2):
+            bad.append(wrong[:40])
+    for _ in range(100):
+        at, wild = random_.randrange(len(text)), random_.choice(["\0", "e999", "-", "nan", " ", "\n", "1e308", "\xff"])
+        file.write_text(text[:at] + wild + text[at + 1:])
+        if subprocess.run([program, "verify", str(file)], capture_output=True).returncode not in (0, 1, 2):
+            bad.append(f"{wild!r} at {at}")
+    return bad
 
 
 def main(program, scenes):
-    accepted = broken_inputs(program, scenes)
-    if accepted:
-        return f"accepted: {accepted}"
-    random_, planted, found = random.Random(1), 0, 0
-    recorded = []
-    for name, end in SCENES.items():
-        file = pathlib.Path(scenes) / f"{name}.toml"
-        text = file.read_text()
-        with tempfile.TemporaryDirectory() as folder:
-            recorded.append((name, verify.Scene(text), verify.read_records(verify.record(file, text, program, end, folder))))
-        judge = verify.Judge(*recorded[-1][1:]).run()
-        if judge.faults or not judge.judged["balance of impulses"]:
-            return f"{name}, as it was recorded:\n{judge.report()}"
-    for kind in (off_the_cone, swapped_sign, drift, lost_impulse):
-        for k in range(25):
-            name, scene, records = recorded[k % len(recorded)]
-            wrong = copy.deepcopy(records)
-            kind(random_, scene, wrong)
+    global PRESS, PULL
+    random_, found, planted, whole = random.Random(1), [0, 0], 0, {}
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "run.cert"
+        for name, end in SCENES.items():
+            subprocess.run([program, "run", f"{name}.toml", "--end", str(end), "--certificate", str(file), "--quiet"], cwd=scenes,
+                           capture_output=True)
+            whole[name] = file.read_text().splitlines(keepends=True)
+            if judged(program, file, whole[name]) != (0, 0):
+                return f"{name}, as it was written: {verify.Judge().run(file).faults[:3]}"
+        bad = damaged(random_, program, file, whole["cart"])
+        if bad:
+            return f"damaged and not told so: {bad}"
+        while planted < 100:
+            fault, name = FAULTS[planted % len(FAULTS)], random_.choice(sorted(whole))
+            lines = list(whole[name])
+            PRESS = max((verify.norm(numbers(each)[16:19]) for each in lines if each.startswith("contact ")), default=math.inf)
+            PULL = max((verify.norm(numbers(each)[2:5]) for each in lines if each.startswith("pull ")), default=math.inf)
+            try:
+                fault(random_, lines)
+            except IndexError:  # nothing of the kind in it
+                continue
             planted += 1
-            if verify.Judge(scene, wrong).run().faults:
-                found += 1
-            else:
-                print(f"not found: {kind.__name__} {k} in {name}")
-    print(f"{found} of {planted} planted faults found")
-    return 0 if found == planted == 100 else 1
+            codes = judged(program, file, lines)
+            found = [n + (code == 1) for n, code in zip(found, codes)]
+            if codes != (1, 1):
+                print(f"{fault.__name__} in {name}: exit codes {codes}")
+    print(f"{found[0]} and {found[1]} of {planted} planted faults found")
+    return 0 if found == [100, 100] else 1
 
 
 if __name__ == "__main__":

@@ -56,6 +56,10 @@ void Stepper::add_force(const char* effect, Force force) {
   implementation_->steps.add_force(effect, std::move(force));
 }
 
+void Stepper::observe(StepObserver observer) {
+  implementation_->steps.observe(std::move(observer));
+}
+
 void Stepper::step() { implementation_->step(); }
 
 double Stepper::time() const {

@@ -122,6 +122,22 @@ void SubStepper::add_joints(std::unique_ptr<JointPart> part) {
   make_stages();
 }
 
+void SubStepper::observe(StepObserver observer) {
+  const auto tell = [this, observer = std::move(observer)](const char* effect, bool first,
+                                                           bool last) {
+    static const std::vector<double> none;
+    observer({effect, first, last, now.start, now.length, now.active, turned,
+              joints ? joints->impulses_at_end() : none});
+  };
+  for (std::size_t k = 0; k < stages.size(); ++k)
+    stages[k].run = [this, tell, k, run = std::move(stages[k].run)] {
+      const char* effect = stages[k].effect;
+      if (k == 0) tell(effect, true, false);
+      run();
+      if (end == SubStepEnd::whole) tell(effect, false, k + 1 == stages.size());
+    };
+}
+
 void SubStepper::add_stage(const char* effect, void (SubStepper::*method)()) {
   stages.push_back({effect, [this, method] { (this->*method)(); }});
 }

@@ -41,6 +41,8 @@ struct SubStepper {
   void add_force(const char* effect, Force force);
   /// Before forces.
   void add_joints(std::unique_ptr<JointPart> part);
+  /// Calls it between the stages.
+  void observe(StepObserver observer);
   /// New solvers, without warm starts.
   void make_solvers();
 

@@ -1,6 +1,7 @@
 // Tether: the engine of scenes whose events are found to a tolerance. SPDX-License-Identifier:
 // BSD-3-Clause
 
+#include "certificate/instant_scribe.hpp"
 #include "driver.hpp"
 #include "effects/numbers.hpp"
 #include "event/model/scene_model.hpp"
@@ -48,10 +49,12 @@ class EventEngine : public ResumableEngine {
       bodies_[b].orientation = scene.bodies[b].orientation.normalized();
     }
     now_.setZero(model_->coordinates() + model_->velocities() + 1);
+    if (scene.certificate) to_certify_ = scene;
     if (begin == Begin::later) return;
     driver_ = std::make_unique<Driver>(*model_, options_, scene_.start ? scene_.start->time : 0.0,
                                        model_->start());
     update_results();
+    certify();
   }
 
   const char* name() const override { return "event"; }
@@ -95,6 +98,12 @@ class EventEngine : public ResumableEngine {
   void resume(const SteppedState& state, const Counts& so_far) override;
 
  private:
+  void certify() {
+    if (to_certify_ && !scribe_)
+      scribe_ = std::make_unique<certificate::InstantScribe>(
+          *to_certify_, *this, [this] { return accelerations(); }, *to_certify_->certificate);
+  }
+  std::vector<std::array<Vector3d, 2>> accelerations() const;
   VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
   StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
   Forces forces_of_motion() const;
@@ -122,6 +131,8 @@ class EventEngine : public ResumableEngine {
   mutable bool contacts_known_ = false;
   std::vector<ContactEvent> events_;
   Diagnostics diagnostics_;
+  std::optional<Scene> to_certify_;  // in SI; only with Scene::certificate
+  std::unique_ptr<certificate::InstantScribe> scribe_;
 };
 
 void EventEngine::update_results() {
@@ -197,6 +208,20 @@ void EventEngine::find_contact_states() const {
              (pair.elliptic ? model_->slip_of(contact) : model_->in_space(contact, slip));
     contacts_.push_back(c);
   }
+}
+
+std::vector<std::array<Vector3d, 2>> EventEngine::accelerations() const {
+  const VectorXd y = driver_->state();
+  VectorXd rate(driver_->motion().size());
+  driver_->motion().rate(driver_->time(), y.data(), rate.data());
+  std::vector<std::array<Vector3d, 2>> out;
+  for (int k = 0; k < model_->bodies().count(); ++k) {
+    const Vector3d a = rate.segment<3>(model_->coordinates() + 6 * k);
+    const Vector3d turn = rate.segment<3>(model_->coordinates() + 6 * k + 3);
+    out.push_back({a * (units_.speed() / units_.time),
+                   model_->bodies().frame(k).R * turn / (units_.time * units_.time)});
+  }
+  return out;
 }
 
 Forces EventEngine::forces_of_motion() const {
@@ -289,6 +314,7 @@ void EventEngine::resume(const SteppedState& state, const Counts& so_far) {
   model_ = std::move(model);
   events_.clear();
   update_results();
+  certify();
 }
 
 // The part of a state behind the bodies.
@@ -354,7 +380,8 @@ void EventEngine::restore(std::istream& in, Restore how) {
   if (how == Restore::near) {
     driver_ = std::make_unique<Driver>(*model_, options_, reached,
                                        VectorXd(saved.head(saved.size() - 1)));
-    return update_results();
+    update_results();
+    return certify();
   }
   driver_ = std::make_unique<Driver>(*model_, options_, m);
   bool arrives = false;
@@ -365,6 +392,7 @@ void EventEngine::restore(std::istream& in, Restore how) {
                              e.what());
   }
   update_results();
+  certify();
   if (!arrives || now_ != saved)
     throw std::runtime_error(
         "the saved state is of another build or machine: the same steps lead to other bits here");

@@ -36,6 +36,7 @@ class JointRows {
   bool has_motion() const { return !motions_.empty(); }
   bool has_couplings() const { return !turns_.empty(); }
   const std::vector<Relation>& couplings() const { return std::get<std::vector<Relation>>(rows_); }
+  std::size_t joint_count() const { return names_.size(); }
   const std::string& name(int joint) const { return names_[at(joint)]; }
   const std::string& joint_of(int row) const;
 

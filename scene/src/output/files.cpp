@@ -311,7 +311,7 @@ constexpr std::size_t kLongestHead = std::size_t{1} << 16;  // bytes; of a sweep
 
 bool is_own(std::string_view head) {
   for (const std::string_view own :
-       {kRecordsHead, kEventsHead, kContactsHead, kCostHead, kStateHead})
+       {kRecordsHead, kEventsHead, kContactsHead, kCostHead, kStateHead, kCertificateHead})
     if (head.substr(0, own.size()) == own) return true;
   const std::string_view mark = kMarkup, line = head.substr(0, head.find('\n'));
   if (line.find(kSweepHead) != std::string_view::npos) return true;

@@ -40,6 +40,7 @@ constexpr const char* kSweepHead =
     "status,met,expectations,time_s,start_energy_J,end_energy_J,lowest_change_J,largest_change_J,"
     "drift,penetration_m,residual,contacts,steps,contact_problems,unsolved,seconds";
 constexpr const char* kStateHead = "tether state ";
+constexpr const char* kCertificateHead = "tether certificate ";
 /// In a line of its own near the beginning of XML and HTML.
 constexpr const char* kMarkup = "<!-- written by Tether -->\n";
 

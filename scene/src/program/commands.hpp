@@ -83,6 +83,7 @@ void add_new_command(CLI::App& app, int* status);
 void add_plan_command(CLI::App& app, int* status);
 void add_run_command(CLI::App& app, int* status);
 void add_sweep_command(CLI::App& app, int* status);
+void add_verify_command(CLI::App& app, int* status);
 
 struct Kind {
   std::string_view name, text;

@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   tether::scene::add_check_command(app, &status);
   tether::scene::add_cost_command(app, &status);
   tether::scene::add_sweep_command(app, &status);
+  tether::scene::add_verify_command(app, &status);
   tether::scene::add_import_command(app, &status);
   tether::scene::add_new_command(app, &status);
   tether::scene::add_contact_command(app, &status);

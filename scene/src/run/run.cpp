@@ -4,6 +4,7 @@
 #include <sstream>
 #include <tether/scene/words.hpp>
 
+#include "certificate/sheet.hpp"
 #include "judge.hpp"
 #include "output/binary.hpp"
 #include "output/files.hpp"
@@ -352,6 +353,12 @@ bool RunResult::met() const {
   return all_of(judgements, [](const Judgement& j) { return j.beyond || (j.judged && j.met); });
 }
 
-RunResult run(const Scene& scene, const RunOptions& options) { return Run(scene, options).go(); }
+RunResult run(const Scene& scene, const RunOptions& options) {
+  if (scene.output["certificate"].empty()) return Run(scene, options).go();
+  certificate::Sheet sheet(scene);
+  Scene observed = scene;
+  observed.certificate = &sheet;
+  return Run(observed, options).go();
+}
 
 }  // namespace tether::scene

@@ -1,5 +1,6 @@
 // Tether: the engine of scenes without contact. SPDX-License-Identifier: BSD-3-Clause
 
+#include "certificate/instant_scribe.hpp"
 #include "effects/list.hpp"
 #include "effects/numbers.hpp"
 #include "integrator.hpp"
@@ -64,6 +65,9 @@ class SmoothEngine : public Engine {
       check_start(kLeft, kSpeedLeft, "may be left where joints contradict each other in a loop");
     }
     renew(start_time_, y_, std::vector<double>(system_->kept()));
+    if (scene.certificate)
+      scribe_ = std::make_unique<certificate::InstantScribe>(
+          scene, *this, [this] { return accelerations(); }, *scene.certificate);
   }
 
   const char* name() const override { return "smooth"; }
@@ -138,6 +142,18 @@ class SmoothEngine : public Engine {
   scene::Forces forces_at(double t, const double* y) const {
     scene::Forces out = system_->forces(t, y, reactions_);
     to_si(units_, scene_, out);
+    return out;
+  }
+  std::vector<std::array<Eigen::Vector3d, 2>> accelerations() const {
+    Eigen::VectorXd y = integrator_->y(), yp(y.size());
+    system_->complete(integrator_->time(), y, yp);
+    std::vector<std::array<Eigen::Vector3d, 2>> out;
+    for (int k = 0; k < system_->moving(); ++k) {
+      const double* q = y.data() + kBody * k + kQuaternion;
+      const Eigen::Vector3d turn = mechanics::rotation(q) * yp.segment<3>(kBody * k + kSpin);
+      out.push_back({yp.segment<3>(kBody * k + kVelocity) * (units_.speed() / units_.time),
+                     turn / (units_.time * units_.time)});
+    }
     return out;
   }
   Integrator::OfState excess_of_state() const {
@@ -261,6 +277,7 @@ class SmoothEngine : public Engine {
   std::vector<ContactState> no_contacts_;
   Counts before_;
   Integrator::Seconds seconds_before_;
+  std::unique_ptr<certificate::InstantScribe> scribe_;  // only with Scene::certificate
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "effects/list.hpp"
 #include "output/binary.hpp"
+#include "step_scribe.hpp"
 
 namespace tether::scene::stepping {
 
@@ -192,9 +193,13 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
   if (any_of(scene.bodies, [](const Body& body) { return body.surface.has_value(); }))
     for (const Body& body : scene.bodies) surface_.push_back(body.surface.value_or(SurfaceSpeed{}));
   add_forces(scene);
+  if (scene.certificate)
+    scribe_ = std::make_unique<StepScribe>(scene, stepper_, *scene.certificate);
   if (scene.start) begin_at(scene.start->time, scene.start->bodies);
   read_bodies();
 }
+
+SteppingEngine::~SteppingEngine() = default;
 
 // Explicit forces first: implicit ones need the velocities that they leave.
 void SteppingEngine::add_forces(const Scene& scene) {

@@ -21,6 +21,15 @@ class SteppedJoints final : public contact::JointEquations {
   std::vector<JointForce> forces(const contact::BodySet& bodies, double t,
                                  const std::vector<double>& impulses,
                                  const std::vector<double>& law_impulses, double dt);
+  /// The bodies whose pulls() are asked for.
+  void set_places(const contact::BodySet& bodies, double t) {
+    bodies_.read_positions(bodies);
+    rows_.set_time(t);
+  }
+  /// Impulses, by row, as wrenches on both bodies of each joint, then of each joint of each
+  /// coupling.
+  std::vector<std::array<mechanics::Wrench<double>, 2>> pulls(
+      const std::vector<double>& impulses) const;
   bool has_laws() const override { return laws_.any(); }
   void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;
   std::string name(int joint) const override { return "joint \"" + rows_.name(joint) + "\""; }
@@ -52,9 +61,12 @@ struct Mapped {
 /// Throws std::invalid_argument, naming what the scene asks for and stepping does not have.
 Mapped map_scene(const Scene& scene);
 
+class StepScribe;
+
 class SteppingEngine final : public Engine {
  public:
   explicit SteppingEngine(const Scene& scene, contact::SolverTeam* team = nullptr);
+  ~SteppingEngine() override;
 
   /// Goes on from states of any time, s: to the next boundary at once, where it is not one. Throws
   /// SimulationError.
@@ -93,7 +105,8 @@ class SteppingEngine final : public Engine {
   std::vector<BodyState> bodies_;
   std::vector<SurfaceSpeed> surface_;  // by body; empty: none moves on its body
   mutable std::vector<ContactState> contacts_;
-  mutable long contacts_of_ = -1;  // step that contacts_ belongs to
+  mutable long contacts_of_ = -1;       // step that contacts_ belongs to
+  std::unique_ptr<StepScribe> scribe_;  // only with Scene::certificate
 };
 
 }  // namespace tether::scene::stepping

@@ -279,6 +279,20 @@ struct StageCost {
   double seconds;      ///< wall time
 };
 
+/// A sub-step as an observer sees it between two of its stages (Stepper::observe).
+struct StepStage {
+  const char* effect;               ///< of the stage that has run, as StageCost
+  bool first;                       ///< none has run yet
+  bool last;                        ///< all have: bodies() are those of its end
+  double start, length;             ///< s
+  const std::vector<char>* active;  ///< bodies that take part; null: all
+  /// Contacts as the problem had them: bias and slip hold in the middle of the sub-step.
+  const std::vector<PointContact>& solved;
+  /// The part of joint_impulses() along the rows at the end of the sub-step.
+  const std::vector<double>& joint_impulses_at_end;
+};
+using StepObserver = std::function<void(const StepStage&)>;  ///< see Stepper::observe
+
 /// Advances a set of bodies by steps of fixed length (method, section 7):
 ///
 ///     v* = v + dt M^-1 f,   v+ = v* + M^-1 J' x,   x+ = x + dt v+,   q+ = exp(dt w / 2) q
@@ -308,6 +322,10 @@ class Stepper {
   /// this and step() throw std::invalid_argument and name them. Bodies that a joint of three rows
   /// or more connects pass through each other.
   void add_joints(std::unique_ptr<JointEquations> joints);
+
+  /// From here on `observer` is called before and after each stage of every sub-step, also of one
+  /// that is taken back. It reads bodies(), contacts() and impulses. After forces and joints.
+  void observe(StepObserver observer);
 
   /// One step of SteppingOptions::step; succeeded() then tells how it went. Throws
   /// std::invalid_argument where joints contradict each other.

@@ -55,6 +55,7 @@ class StepJoints final : public JointPart {
   void scale_restitution(const std::function<double(int)>& scale) override;
   void list_laws(std::vector<LawState>& out) const override;
   const std::vector<Strike>& strikes() const override { return laws_.strikes; }
+  const std::vector<double>& impulses_at_end() const override { return row_.x; }
   const std::vector<double>& law_impulses() const override { return laws_.impulses; }
 
   /// Largest |g| at the end of the last step, m or rad.

@@ -96,6 +96,8 @@ class JointPart : public IslandMaker {
   virtual const StepperMemory::Vibration& vibration() const = 0;
   virtual void set_vibration(const StepperMemory::Vibration& vibration) = 0;
   virtual const std::vector<double>& impulses() const = 0;
+  /// The part of them along the rows at the end of the last sub-step.
+  virtual const std::vector<double>& impulses_at_end() const = 0;
   /// An impact has changed the velocities where the bodies are: impulses() are those that it takes.
   virtual void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
                            const StepContacts& contacts) = 0;

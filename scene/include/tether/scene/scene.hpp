@@ -206,7 +206,8 @@ enum class EngineKind : std::uint8_t { automatic, smooth, stepping, event };
 
 /// Files that a run writes.
 struct Output {
-  /// Names of files by their formats: csv, vtk, svg, html, state; empty: not written.
+  /// Names of files by their formats: csv, vtk, svg, html, certificate, state;
+  /// empty: not written.
   std::map<std::string, std::string, std::less<>> files;
   /// Name of the file of a format, which is added where there is none.
   std::string& operator[](std::string_view format) { return files[std::string(format)]; }
@@ -300,6 +301,10 @@ struct Expect {
   int joint = -1, spring = -1;              ///< of quantities of a joint, of a spring
 };
 
+namespace certificate {
+class Sheet;
+}
+
 /// All that a scene file says, in SI units; see docs/scene_fields.md.
 struct Scene {
   std::string name, file;                  ///< title; the file it was read from
@@ -328,6 +333,8 @@ struct Scene {
   std::vector<std::string> surface_files;   ///< that were read with it; no output replaces them
   /// In place of the bodies at t = 0, to which joints and springs refer all the same. Not of files.
   std::optional<SceneStart> start;
+  /// Engines write to it what they do; null: nobody asks. Not of files.
+  certificate::Sheet* certificate = nullptr;
 
   /// Whether a body can; -1, the world, cannot.
   bool moves(int body) const { return body >= 0 && !bodies[linalg::at(body)].fixed; }

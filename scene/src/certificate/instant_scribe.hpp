@@ -1,0 +1,41 @@
+// Tether: writes instants of smooth motion to the certificate. SPDX-License-Identifier:
+// BSD-3-Clause
+#pragma once
+
+#include "certificate/sheet.hpp"
+#include "effects/list.hpp"
+
+namespace tether::scene::certificate {
+
+/// Writes the state of an engine of this scene, and all forces with where they act. Forces of
+/// effects are evaluated anew, in SI; those of joints and contacts are the engine's.
+class InstantScribe final : public Source {
+ public:
+  /// Accelerations, linear and angular, of the moving bodies: m/s^2, rad/s^2, world axes.
+  using Accelerations = std::function<std::vector<std::array<Vector3d, 2>>()>;
+  InstantScribe(const Scene& scene, const Engine& engine, Accelerations accelerations,
+                Sheet& sheet);
+  ~InstantScribe() override { sheet_.leave(*this); }
+  InstantScribe(const InstantScribe&) = delete;
+  InstantScribe& operator=(const InstantScribe&) = delete;
+
+  void flush() override;
+
+ private:
+  void put_pushes(std::string& out);
+  void put_contacts(std::string& out) const;
+  void put_joints(std::string& out) const;
+  Vector3d surface_velocity(int body, const Vector3d& point) const;
+  Vector3d centre(int body) const;
+
+  const Scene scene_;
+  const Engine& engine_;
+  Accelerations accelerations_;
+  Sheet& sheet_;
+  mechanics::Bodies bodies_;
+  std::vector<std::unique_ptr<mechanics::Force>> forces_;
+  std::vector<mechanics::Load6> loads_;
+  double last_ = -1;  // s, written
+};
+
+}  // namespace tether::scene::certificate

@@ -1,0 +1,330 @@
+// Tether: writes what steps do to the certificate. SPDX-License-Identifier: BSD-3-Clause
+#include "step_scribe.hpp"
+
+namespace tether::scene::stepping {
+
+using certificate::Line;
+using contact::PointContact;
+using contact::StepContacts;
+using Eigen::Vector3d;
+using linalg::at;
+
+namespace {
+
+constexpr double kSameTime = 1e-9;  // of a sub-step
+
+bool same(const BodyState& a, const BodyState& b) {
+  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs() &&
+         a.velocity == b.velocity && a.angular_velocity == b.angular_velocity;
+}
+
+bool same_place(const BodyState& a, const BodyState& b) {
+  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
+}
+
+// Stages that are no forces.
+bool is_mechanism(std::string_view effect) {
+  for (const char* each :
+       {"joints", "contact", "restitution", "collision", "penetration", "motion"})
+    if (effect == each) return true;
+  return false;
+}
+
+bool any(const std::vector<Vector3d>& impulses) {
+  return any_of(impulses, [](const Vector3d& x) { return !x.isZero(0); });
+}
+
+}  // namespace
+
+StepScribe::StepScribe(const Scene& scene, contact::Stepper& stepper, certificate::Sheet& sheet)
+    : scene_(scene),
+      stepper_(stepper),
+      sheet_(sheet),
+      held_(scene.bodies.size(), 0),
+      extrapolates_(stepper.options().accuracy > 0),
+      chain_(scene.bodies.size()) {
+  for (const std::size_t i : scene.moving()) moving_.push_back(static_cast<int>(i));
+  if (!scene.joints.empty()) joints_ = std::make_unique<SteppedJoints>(scene);
+  for (const Joint& joint : scene.joints)
+    for (const int body : {joint.first, joint.second})
+      if (scene.moves(body)) held_[at(body)] = 1;
+  sheet.begin(scene, "stepping", *this);
+  stepper.observe([this](const contact::StepStage& stage) { see(stage); });
+}
+
+StepScribe::~StepScribe() {
+  try {
+    flush();
+  } catch (const std::exception&) {  // the recorder of the certificate meets it again
+  }
+  sheet_.leave(*this);
+}
+
+BodyState StepScribe::state(int body) const {
+  const contact::BodySet& b = stepper_.bodies();
+  return {b.position[at(body)], b.orientation[at(body)], b.motion[at(body)].velocity,
+          b.motion[at(body)].angular_velocity};
+}
+
+void StepScribe::take_states(std::vector<BodyState>& out) const {
+  out.resize(chain_.size());
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = state(static_cast<int>(i));
+}
+
+void StepScribe::see(const contact::StepStage& stage) {
+  if (stage.first) return begin_part(stage);
+  after_stage(stage);
+  if (stage.last) end_part(stage);
+}
+
+void StepScribe::begin_part(const contact::StepStage& stage) {
+  if (stepper_.counts().steps != step_) {
+    flush();
+    step_ = stepper_.counts().steps;
+    began_ = stage.start;
+  }
+  now_.clear();
+  for (const int i : moving_)
+    if (stage.active == nullptr || (*stage.active)[at(i)] != 0) now_.push_back(i);
+  explain(stage.start, now_);
+  take_states(begin_);
+  last_ = solved_ = placed_ = begin_;
+  pushes_.clear();
+  moved_ = false;
+  at_first_ = true;
+  first_impulses_.clear();
+  contacts_ = {};
+}
+
+void StepScribe::after_stage(const contact::StepStage& stage) {
+  const std::string_view effect = stage.effect;
+  if (!moved_ && effect == "motion") {
+    moved_ = true;
+    placed_ = last_;
+    contacts_ = stepper_.contacts();
+    as_solved_ = stage.solved;
+  }
+  const bool puts_on_joints = at_first_ && effect == "joints";
+  at_first_ = false;
+  if (puts_on_joints) note_push("put onto joints");
+  if (!is_mechanism(effect) && (!moved_ || effect == "sleep")) note_push(stage.effect);
+  take_states(last_);
+  if (!moved_ && effect != "penetration") solved_ = last_;
+  if (effect == "contact") first_impulses_ = stepper_.contacts().impulses;
+}
+
+void StepScribe::note_push(const char* effect) {
+  const contact::BodySet& b = stepper_.bodies();
+  for (const int i : now_) {
+    const BodyState now = state(i);
+    const Vector3d dv = now.velocity - last_[at(i)].velocity;
+    const Vector3d dw = now.angular_velocity - last_[at(i)].angular_velocity;
+    if (dv.isZero(0) && dw.isZero(0)) continue;
+    const Vector3d spin = now.orientation * (b.inertia[at(i)] * (now.orientation.conjugate() * dw));
+    Line(pushes_, "push") << i << b.mass[at(i)] * dv << spin << effect;
+  }
+}
+
+bool StepScribe::is_at(double time, const std::vector<int>& bodies) const {
+  for (const int i : bodies) {
+    const Reached& reached = chain_[at(i)];
+    if (std::abs(reached.time - time) > kSameTime * stepper_.options().step ||
+        !same(reached.state, state(i)))
+      return false;
+  }
+  return true;
+}
+
+// False: they have never been where they are now.
+bool StepScribe::take_back(double time, const std::vector<int>& bodies) {
+  const std::vector<Reached> end = chain_;
+  for (std::size_t k = parts_.size(); k > 0; --k) {
+    const Part& part = parts_[k - 1];
+    for (std::size_t i = 0; i < part.bodies.size(); ++i)
+      chain_[at(part.bodies[i])] = part.before[i];
+    if (!is_at(time, bodies)) continue;
+    trial_.clear();
+    trial_at_ = k - 1;
+    for (std::size_t j = k - 1; j < parts_.size(); ++j) trial_.push_back(parts_[j].text);
+    parts_.resize(k - 1);
+    return true;
+  }
+  chain_ = end;
+  return false;
+}
+
+// Says how bodies have come from where the last sub-step left them to where they are.
+void StepScribe::explain(double time, const std::vector<int>& bodies) {
+  if (is_at(time, bodies) || take_back(time, bodies)) return;
+  const auto reached = [&](const auto& like) {
+    return all_of(bodies, [&](int i) {
+      return chain_[at(i)].time >= 0 && like(chain_[at(i)].state, state(i));
+    });
+  };
+  Part part;
+  part.start = time;
+  part.bodies = bodies;
+  for (const int i : bodies) part.before.push_back(chain_[at(i)]);
+  if (reached(same_place) && any(stepper_.contacts().impulses)) {
+    put_impact(part);
+  } else if (extrapolates_ && !parts_.empty() && !trial_.empty()) {
+    for (std::string& each : trial_) {
+      each.replace(0, 4, "trial");
+      parts_.insert(parts_.begin() + static_cast<std::ptrdiff_t>(trial_at_++), Part());
+      parts_[trial_at_ - 1].text = std::move(each);
+    }
+    trial_.clear();
+    Line(part.text, "extrapolated") << time;
+  } else {
+    Line(part.text, "start") << time;
+  }
+  reach(time, bodies, part.text);
+  parts_.push_back(std::move(part));
+}
+
+void StepScribe::reach(double time, const std::vector<int>& bodies, std::string& out) {
+  for (const int i : bodies) {
+    chain_[at(i)] = {time, state(i)};
+    Line(out, "to") << i << chain_[at(i)].state;
+  }
+}
+
+// At the places that the bodies have, from the velocities of the chain.
+void StepScribe::put_impact(Part& part) {
+  take_states(begin_);
+  StepContacts struck = stepper_.contacts();
+  std::string inside;
+  const double residual = put_contacts(inside, struck, struck.points, begin_);
+  if (hold(part.bodies)) put_joints(inside, begin_, part.start, stepper_.joint_impulses(), 0);
+  const bool in_turn =
+      stepper_.options().simultaneous_impacts == contact::SimultaneousImpacts::in_turn;
+  Line(part.text, "part") << part.start << 0.0 << (in_turn ? 1 : 0) << residual;
+  part.text += inside;
+}
+
+// Returns the largest natural residual, m/s.
+double StepScribe::put_contacts(std::string& out, const StepContacts& contacts,
+                                const std::vector<PointContact>& solved,
+                                const std::vector<BodyState>& velocities) const {
+  const contact::BodySet& b = stepper_.bodies();
+  bool as_solved = solved.size() == contacts.points.size() && any(contacts.impulses);
+  for (std::size_t k = 0; as_solved && k < solved.size(); ++k)
+    as_solved = solved[k].id == contacts.points[k].id;
+  double most = 0;
+  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+    const PointContact& c = as_solved ? solved[k] : contacts.points[k];
+    const Vector3d x = k < contacts.impulses.size() ? contacts.impulses[k] : Vector3d::Zero();
+    const Vector3d moment = k < contacts.moments.size() ? contacts.moments[k] : Vector3d::Zero();
+    Line(out, "contact") << c.first << c.second << begin_[at(c.first)].position + c.r1
+                         << begin_[at(c.second)].position + c.r2 << c.normal << contacts.gaps[k]
+                         << c.bias << c.slip << x << moment;
+    const auto speed = [&](int body, const Vector3d& r) -> Vector3d {
+      const BodyState& s = velocities[at(body)];
+      return s.velocity + s.angular_velocity.cross(r);
+    };
+    const Vector3d w = speed(c.first, c.r1) - speed(c.second, c.r2) + c.slip + c.bias * c.normal;
+    const double inverse = b.motion[at(c.first)].inverse_mass + b.motion[at(c.second)].inverse_mass;
+    most = std::max(most, certificate::natural_residual(friction(c), c.normal, inverse * x, w));
+  }
+  return most;
+}
+
+certificate::Friction StepScribe::friction(const PointContact& c) const {
+  certificate::Friction out{c.mu, c.mu, Vector3d::Zero()};
+  out.associated = stepper_.options().law == contact::Law::maximum_dissipation;
+  for (const Pair& pair : scene_.pairs) {
+    if (!pair.is_elliptic()) continue;
+    for (const auto& [first, second] : {std::pair(c.first, c.second), std::pair(c.second, c.first)})
+      if (scene_.bodies[at(first)].material == pair.first &&
+          scene_.bodies[at(second)].material == pair.second)
+        out = {pair.friction, *pair.friction_across,
+               begin_[at(first)].orientation *
+                   scene_.bodies[at(first)].friction_axis.value_or(Vector3d::Zero()),
+               out.associated};
+  }
+  return out;
+}
+
+bool StepScribe::hold(const std::vector<int>& bodies) const {
+  return joints_ && any_of(bodies, [&](int i) { return held_[at(i)] != 0; });
+}
+
+void StepScribe::put_joints(std::string& out, const std::vector<BodyState>& at, double t,
+                            const std::vector<double>& impulses, int when) {
+  set_places(at);
+  joints_->set_places(places_, t);
+  std::size_t j = 0;
+  for (const auto& [on_first, on_second] : joints_->pulls(impulses))
+    Line(out, "pull") << static_cast<int>(j++) << when << on_first << on_second;
+}
+
+// As they were where the sub-step began.
+void StepScribe::put_laws(std::string& out, double t) {
+  if (!joints_->has_laws()) return;
+  set_places(begin_);
+  laws_.clear();
+  joints_->add_laws(places_, t, laws_);
+  const std::vector<double>& impulses = stepper_.law_impulses();
+  for (int k = 0; k < laws_.count() && at(k) < impulses.size(); ++k) {
+    const contact::JointLaws::Law& law = laws_[k];
+    Line line(out, "law");
+    line << law.joint
+         << (law.limit         ? 0
+             : law.is_sprung() ? 2
+                               : 1)
+         << law.gap << law.restitution << law.rate << law.bound << law.stretch << law.stiffness
+         << law.damping << impulses[at(k)];
+    for (const auto* term = laws_.rows().begin(k); term != laws_.rows().end(k); ++term)
+      line << term->body << Vector3d(term->G.head<3>()) << Vector3d(term->G.tail<3>());
+  }
+}
+
+void StepScribe::set_places(const std::vector<BodyState>& of) {
+  places_.position.resize(of.size());
+  places_.orientation.resize(of.size());
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    places_.position[i] = of[i].position;
+    places_.orientation[i] = of[i].orientation;
+  }
+}
+
+void StepScribe::end_part(const contact::StepStage& stage) {
+  const double end = stage.start + stage.length;
+  std::string inside = pushes_;
+  const bool composed = contacts_.impulses != first_impulses_;
+  const double residual = put_contacts(inside, contacts_, as_solved_, solved_);
+  if (hold(now_)) {
+    put_joints(inside, begin_, stage.start, stepper_.joint_impulses(), 0);
+    put_joints(inside, last_, end, stage.joint_impulses_at_end, 1);
+    put_laws(inside, stage.start);
+  }
+  Part part;
+  part.start = stage.start;
+  part.bodies = now_;
+  Line(part.text, "part") << stage.start << stage.length << (composed ? 1 : 0) << residual;
+  part.text += inside;
+  for (const int i : now_) {
+    part.before.push_back(chain_[at(i)]);
+    if (held_[at(i)] != 0 && (!contacts_.points.empty() || joints_->has_laws()))
+      Line(part.text, "via") << i << solved_[at(i)].velocity << solved_[at(i)].angular_velocity;
+    if (!same_place(placed_[at(i)], begin_[at(i)]))
+      Line(part.text, "placed") << i << placed_[at(i)].position << placed_[at(i)].orientation;
+  }
+  reach(end, now_, part.text);
+  parts_.push_back(std::move(part));
+}
+
+void StepScribe::flush() {
+  if (step_ < 0 || stepper_.counts().steps == step_) return;  // nothing, or amid a step
+  explain(stepper_.time(), moving_);
+  std::string out;
+  Line(out, "step") << static_cast<double>(step_) << began_ << stepper_.time()
+                    << stepper_.residual() << (stepper_.succeeded() ? 1 : 0);
+  for (const Part& part : parts_) out += part.text;
+  parts_.clear();
+  trial_.clear();
+  step_ = -1;
+  sheet_.put(out);
+}
+
+}  // namespace tether::scene::stepping
