@@ -21,7 +21,7 @@ using mjcf::Geom;
 using mjcf::InertiaFrom;
 using mjcf::Settings;
 
-/// What elements have of those around them: a class, and of <frame> and <replicate> a place in the
+/// Elements have a class from those around them, and from <frame> and <replicate> a place in the
 /// frame of their link and an end of their names.
 struct Around {
   std::string class_name;
