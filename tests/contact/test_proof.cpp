@@ -574,7 +574,8 @@ TEST_CASE("without impulses w = -b is exact, and so is a grazing contact") {
   for (const Problem& p : {one(0, 0, 0), one(0, 1, 0)}) {
     const Proof q = prove(p, VectorXd::Zero(3), 0);
     CHECK(q.status == ProofStatus::proven);
-    CHECK(q.radius <= 1e-100);
+    CHECK(q.radius == 0);
+    CHECK(q.relative_radius == 0);
   }
 }
 
@@ -645,6 +646,42 @@ TEST_CASE("numbers beyond doubles are not proven, and units do not matter") {
   MatrixXd far = A;
   far(0, 8) = far(8, 0) = 5e-324;
   CHECK(prove(Problem::dense(far, k.problem.b(), mu), k.x).status == ProofStatus::not_proven);
+}
+
+TEST_CASE("bounds are finite numbers, or there is no proof") {
+  const Problem p = one(4, 1, -1);
+  const Proof far = prove(p, Eigen::Vector3d(1e200, 1, 1));
+  CHECK(far.status == ProofStatus::proven);
+  CHECK((far.radius >= 1e200 && far.radius <= 1.01e200));
+  const Proof beyond = prove(p, VectorXd::Constant(3, 1.7e308));
+  CHECK(beyond.status == ProofStatus::not_proven);
+  CHECK(beyond.relative_radius == detail::kInfinity);
+  CHECK_THAT(beyond.reason, Catch::Contains("|x| times about sqrt(A_nn) = inf"));
+  // A solution of 1e450 N s.
+  const MatrixXd A = 1e-300 * MatrixXd::Identity(3, 3);
+  const Problem large = Problem::dense(A, Eigen::Vector3d(1e150, 0, 0), VectorXd::Ones(1));
+  CHECK(prove(large, VectorXd::Zero(3)).status == ProofStatus::not_proven);
+}
+
+TEST_CASE("the contact whose numbers leave the range is named") {
+  MatrixXd A = MatrixXd::Identity(6, 6);
+  A(0, 3) = A(3, 0) = 0.5;
+  A(5, 4) = 5e-324;
+  VectorXd b = VectorXd::Ones(6);
+  const Proof q = prove(Problem::dense(A, 3 * b, VectorXd::Ones(2)), 5 * b);
+  CHECK(q.status == ProofStatus::proven);
+  A.bottomRightCorner(3, 3) *= 1e4;
+  A(5, 4) = 5e-324;
+  const Proof none = prove(Problem::dense(A, 3 * b, VectorXd::Ones(2)), 5 * b);
+  CHECK(none.contact == 1);
+  CHECK_THAT(none.reason, Catch::Contains("A = 4.9"));
+}
+
+TEST_CASE("velocities over a box without bounds are anything") {
+  const detail::ProofIsland island =
+      detail::proof_island(one(4, 1, -1), Eigen::Vector3d(1, 0, 0));  // A is diagonal
+  const detail::Velocities v(island, {VectorXd::Ones(3), Eigen::Vector3d(detail::kInfinity, 1, 1)});
+  for (const Interval& w : v.w) CHECK(w.hi - w.lo >= 2);
 }
 
 TEST_CASE("nothing is proven in other arithmetic") {

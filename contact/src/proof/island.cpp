@@ -2,18 +2,21 @@
 #include "proof/island.hpp"
 
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "problem/refuse.hpp"
 
 namespace tether::contact::detail {
 namespace {
 
-double shifted(double value, int exponent) {
+[[noreturn]] void refuse_range(int contact, const char* what, double value) {
+  throw OutOfRange(contact, std::string(what) + " = " + shown(value) +
+                                ": leaves the range of doubles in units near 1");
+}
+
+double shifted(int contact, const char* what, double value, int exponent) {
   const double out = std::ldexp(value, exponent);
   if (!std::isfinite(out) || std::ldexp(out, -exponent) != value)
-    throw std::range_error(shown(value) + " leaves the range of doubles in units near 1");
+    refuse_range(contact, what, value);
   return out;
 }
 
@@ -32,11 +35,15 @@ ProofIsland proof_island(const Problem& problem, const linalg::VectorView& impul
   out.mu.resize(n);
   std::vector<int> half(at(n));  // 2^half is near sqrt(A_nn)
   double largest_x = 0, largest_b = 0;
+  const auto grow = [&](double& largest, const char* what, int i, const auto& v, int shift) {
+    largest = std::max(largest, std::ldexp(v.segment(d * i, d).stableNorm(), shift));
+    if (!std::isfinite(largest)) refuse_range(i, what, largest);
+  };
   for (int i = 0; i < n; ++i) {
     out.mu[i] = problem.mu(i);
     half[at(i)] = exponent_of(problem.local(i).a) / 2;
-    largest_x = std::max(largest_x, std::ldexp(out.x.segment(d * i, d).stableNorm(), half[at(i)]));
-    largest_b = std::max(largest_b, std::ldexp(out.b.segment(d * i, d).stableNorm(), -half[at(i)]));
+    grow(largest_x, "|x| times about sqrt(A_nn)", i, out.x, half[at(i)]);
+    grow(largest_b, "|b| over about sqrt(A_nn)", i, out.b, -half[at(i)]);
   }
   const int unit = exponent_of(largest_x > 0 ? largest_x : largest_b);
   for (int i = 0; i < n; ++i) {
@@ -45,10 +52,10 @@ ProofIsland proof_island(const Problem& problem, const linalg::VectorView& impul
   }
   for (int r = 0; r < d * n; ++r) {
     const int i = r / d;
-    out.b[r] = shifted(out.b[r], -out.velocity[at(i)]);
-    out.x[r] = shifted(out.x[r], -out.impulse[at(i)]);
+    out.b[r] = shifted(i, "b", out.b[r], -out.velocity[at(i)]);
+    out.x[r] = shifted(i, "an impulse", out.x[r], -out.impulse[at(i)]);
     for (int k = 0; k < d * n; ++k)
-      out.A(r, k) = shifted(out.A(r, k), -half[at(i)] - half[at(k / d)]);
+      out.A(r, k) = shifted(i, "A", out.A(r, k), -half[at(i)] - half[at(k / d)]);
   }
   return out;
 }
@@ -65,7 +72,7 @@ Velocities::Velocities(const ProofIsland& island, const Box& box) {
     const double spread =
         is_point ? 0 : above(island.A.row(r).cwiseAbs().dot(box.radius), static_cast<double>(rows));
     const Interval middle = sum.terms() > 1 ? sum.value() : Interval(-island.b[r]);
-    w.push_back(spread > 0 ? middle + Interval(-spread, spread) : middle);
+    w.push_back(is_point ? middle : middle + Interval(-spread, spread));
     size = std::max(size, sum.size() + spread);
   }
 }

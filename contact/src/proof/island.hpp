@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <stdexcept>
+#include <string>
 #include <tether/contact/problem.hpp>
 #include <tether/linalg/index.hpp>
 #include <vector>
@@ -23,7 +25,13 @@ struct ProofIsland {
   int contacts() const { return static_cast<int>(mu.size()); }
 };
 
-/// Throws std::range_error where a number would leave the range of doubles.
+/// A number of this contact would leave the range of doubles.
+struct OutOfRange : std::range_error {
+  OutOfRange(int of, const std::string& what) : std::range_error(what), contact(of) {}
+  int contact;
+};
+
+/// Throws OutOfRange.
 ProofIsland proof_island(const Problem& problem, const linalg::VectorView& impulses);
 
 /// All points within `radius` of x, component by component.

@@ -4,7 +4,6 @@
 
 #include <cfloat>
 #include <cmath>
-#include <stdexcept>
 #include <tether/contact/solver.hpp>
 
 #include "problem/refuse.hpp"
@@ -32,10 +31,16 @@ double in_units(double value, int exponent) {
 double distance(const ProofIsland& island, const VectorX& given, const Box& box) {
   double out = 0;
   for (int i = 0; i < island.contacts(); ++i) {
-    Interval sum;
-    for (int r = island.dimension * i; r < island.dimension * (i + 1); ++r)
-      sum = sum + square(box[r] - std::ldexp(given[r], -island.impulse[at(i)]));
-    out = std::max(out, in_units(root(sum).hi, island.impulse[at(i)]));
+    const int unit = island.impulse[at(i)];
+    Eigen::Vector3d off = Eigen::Vector3d::Zero();
+    for (int r = 0; r < island.dimension; ++r) {
+      const int row = island.dimension * i + r;
+      const double x = std::ldexp(given[row], -unit);
+      const bool same = box.radius[row] == 0 && box.x[row] == x;
+      if (!same || std::ldexp(x, unit) != given[row]) off[r] = (box[row] - x).magnitude();
+    }
+    const double length = off.stableNorm();  // a few roundings
+    if (length > 0) out = std::max(out, in_units(above(length, 8), unit));
   }
   return out;
 }
@@ -62,7 +67,7 @@ Proof prove_from(const Problem& problem, const VectorX& start, const VectorX& gi
   const NearbySolution near = nearby_solution(island, candidate);
   Eigen::Index worst = 0;
   const double largest = near.change.maxCoeff<Eigen::PropagateNaN>(&worst);
-  if (largest > 0)
+  if (!(largest <= 0))  // or no number
     out.relative_change = std::nextafter(largest / island.b.lpNorm<Eigen::Infinity>(), kInfinity);
   if (!(out.relative_change <= allowed))
     return without_proof(static_cast<int>(worst) / island.dimension,
@@ -78,17 +83,26 @@ Proof prove_from(const Problem& problem, const VectorX& start, const VectorX& gi
   return out;
 }
 
+// Bounds that are no doubles show nothing.
+Proof in_range(const Proof& proof) {
+  const bool finite = proof.radius < kInfinity && proof.change < kInfinity;
+  return finite || proof.status == ProofStatus::not_proven
+             ? proof
+             : without_proof(0, "the radius or the change leaves the range of doubles");
+}
+
 // From the impulses themselves: the nearest solution; else from those of a Solver.
 Proof prove_island(const Problem& problem, const VectorX& given, double allowed) {
   try {
-    const Proof out = prove_from(problem, given, given, allowed);
+    const Proof out = in_range(prove_from(problem, given, given, allowed));
     if (out.status != ProofStatus::not_proven) return out;
     Options options;
     options.law = Law::coulomb;
     options.tolerance = 1e-13;  // near rounding, which ends the solve where it comes first
-    return prove_from(problem, Solver(options).solve(problem, given).impulses, given, allowed);
-  } catch (const std::range_error& e) {
-    return without_proof(0, e.what());
+    const VectorX better = Solver(options).solve(problem, given).impulses;
+    return in_range(prove_from(problem, better, given, allowed));
+  } catch (const OutOfRange& e) {
+    return without_proof(e.contact, e.what());
   }
 }
 
@@ -159,8 +173,9 @@ Proof prove(const Problem& problem, const linalg::VectorView& impulses, double a
     detail::join(out, detail::prove_island(problem.part(contacts), given, allowed), contacts);
   }
   if (out.status == ProofStatus::not_proven) out.regimes.clear();
-  out.relative_radius =
-      out.radius > 0 ? std::nextafter(out.radius / largest, detail::kInfinity) : 0;
+  // At most the largest |x_i|, which has a few roundings.
+  largest = std::nextafter(std::min(largest, std::numeric_limits<double>::max()), 0.0);
+  out.relative_radius = out.radius > 0 ? detail::above(out.radius / largest, 8) : 0;
   return out;
 }
 
