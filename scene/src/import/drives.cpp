@@ -127,7 +127,11 @@ class Driving {
 
   void add(const Drive& drive) {
     const Vector3d law = law_of(drive, options_);
-    if (law.isZero(0)) return remarks_.add("actuators that exert nothing (--control)", drive.name);
+    const bool idle =
+        !drive.to.empty() && std::all_of(drive.to.begin(), drive.to.end(),
+                                         [](const Transmission& to) { return to.ratio == 0; });
+    if (law.isZero(0) || idle)
+      return remarks_.add("actuators that exert nothing (--control)", drive.name);
     for (const Transmission& to : drive.to)
       if (coordinates_.count(to.joint) == 0)
         return remarks_.add("actuators of what is no hinge or slider here", drive.name);
@@ -163,6 +167,8 @@ class Driving {
       motor.target = r * (law[0] - mean) / motor.stiffness - along.value;
     else
       motor.rate = r * (law[0] - mean) / motor.damping;
+    if (!std::isfinite(motor.stiffness + motor.damping + motor.target + motor.rate))
+      return remarks_.add("actuators whose gains are beyond all numbers", drive.name);
     if (mean != 0) add_constant(joint, r * mean, scene_);
     joint.motor = motor;
   }

@@ -317,6 +317,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
   Reader reader(model, settings, problems);
   bool has_world = false;
   mjcf::read_tendons(root, settings, model, problems);
+  std::set<std::string> actuators;
   std::vector<const Node*> equalities;
   for (const Node* each = root.FirstChildElement(); each != nullptr;
        each = each->NextSiblingElement()) {
@@ -330,7 +331,7 @@ Model read_mjcf(const Node& root, Problems& problems) {
         if (is(*each, "contact") && is(*part, "exclude"))
           read_excluded(*part, model, problems);
         else if (is(*each, "actuator"))
-          mjcf::read_actuator(*part, settings, model, problems);
+          mjcf::read_actuator(*part, settings, actuators, model, problems);
         else if (is(*each, "equality"))
           equalities.push_back(part);
         else

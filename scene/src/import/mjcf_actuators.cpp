@@ -38,10 +38,11 @@ bool read_laws(Tag& tag, const std::string& kind, Drive& out) {
   out.gain = {1, 0, 0};
   out.bias.setZero();
   if (kind == "general") {
-    for (const char* type : {"gaintype", "biastype", "dyntype"}) {
-      const std::string word = tag.text(type, "none");
-      if (word == "muscle" || word == "user") return false;
-    }
+    const std::string gain = tag.text("gaintype", "fixed"), bias = tag.text("biastype", "none"),
+                      way = tag.text("dyntype", "none");
+    if ((gain != "fixed" && gain != "affine") || (bias != "none" && bias != "affine") ||
+        (way != "none" && way != "integrator" && way != "filter" && way != "filterexact"))
+      return false;
     out.gain = read_law(tag, "gaintype", "gainprm", "fixed", 1);
     out.bias = read_law(tag, "biastype", "biasprm", "none", 0);
     tag.numbers("dynprm", 1, 10);
@@ -68,6 +69,8 @@ bool read_laws(Tag& tag, const std::string& kind, Drive& out) {
 std::optional<std::pair<double, double>> read_range(Tag& tag, const char* key, const char* limited,
                                                     const Settings& settings) {
   const std::string word = tag.text(limited, "auto");
+  if (word != "auto" && word != "true" && word != "false")
+    tag.wrong(limited, "must be true, false or auto");
   const std::vector<double> range = tag.numbers(key, 2, 2);
   if (word == "false" || (word == "auto" && !settings.autolimits) || range.empty()) return {};
   if (!(range[0] < range[1])) {
@@ -92,9 +95,17 @@ std::vector<Transmission> read_transmission(Tag& tag, const Model& model) {
   return out;
 }
 
+/// Names tell elements of a kind apart.
+void take_name(const Node& node, std::set<std::string>& names, Problems& problems) {
+  const char* const name = node.Attribute("name");
+  if (name != nullptr && *name != '\0' && !names.insert(name).second)
+    problems.add(node.GetLineNum(), path(node) + ": name", "", "another one has it already");
+}
+
 }  // namespace
 
 void read_tendons(const Node& root, const Settings& settings, Model& model, Problems& problems) {
+  std::set<std::string> names;
   for (const Node* section = root.FirstChildElement("tendon"); section != nullptr;
        section = section->NextSiblingElement("tendon"))
     for (const Node* each = section->FirstChildElement(); each != nullptr;
@@ -102,6 +113,7 @@ void read_tendons(const Node& root, const Settings& settings, Model& model, Prob
       Tag own(*each, problems);
       Tag tag(*each, problems, settings.defaults(*each, own.text("class"), problems, "tendon"));
       const std::string name = name_or_line(*each);
+      take_name(*each, names, problems);
       bool acts = tag.text("limited", "auto") != "false" && tag.has("range");
       for (const char* key : {"stiffness", "damping", "frictionloss", "armature"})
         acts = tag.number(key, 0) != 0 || acts;
@@ -117,7 +129,9 @@ void read_tendons(const Node& root, const Settings& settings, Model& model, Prob
     }
 }
 
-void read_actuator(const Node& node, const Settings& settings, Model& model, Problems& problems) {
+void read_actuator(const Node& node, const Settings& settings, std::set<std::string>& names,
+                   Model& model, Problems& problems) {
+  take_name(node, names, problems);
   const std::string kind = node.Name();
   Tag own(node, problems);
   const std::string of_class = own.text("class");

@@ -140,7 +140,7 @@ Document::Document(std::string_view text, Problems& problems) {
     if (xml_.ErrorID() == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
       why = fmt::format("more than {} elements inside each other", TINYXML2_MAX_ELEMENT_DEPTH);
     if (xml_.ErrorID() == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) why = "it is empty";
-    problems.add(xml_.ErrorLineNum(), "", "", "is not XML that can be read: " + why);
+    problems.add(std::max(1, xml_.ErrorLineNum()), "", "", "is not XML that can be read: " + why);
   } else if (xml_.RootElement() == nullptr) {
     problems.add(1, "", "", "has no element");
   } else {

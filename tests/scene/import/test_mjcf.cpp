@@ -396,6 +396,13 @@ TEST_CASE("MJCF: actuators and armature that scenes lack are named, with what th
   CHECK(said(actuator("<motor name='m' joint='h'/>"), "exert nothing (--control): m"));
   CHECK(said(actuator("<muscle name='m' joint='h'/>"), "kind muscle: m"));
   CHECK(said(actuator("<general name='m' joint='h' gaintype='muscle'/>"), "kind general: m"));
+  for (const char* word : {"gaintype", "biastype", "dyntype"})
+    CHECK(said(actuator(std::string("<general name='m' joint='h' ") + word + "='Affine'/>"),
+               "kind general: m"));
+  for (const char* each : {"position", "velocity"})
+    CHECK(said(actuator(std::string("<") + each + " name='m' joint='h' gear='0'/>"),
+               "exert nothing (--control): m"));
+  CHECK(said(actuator("<position name='m' joint='h' gear='1e200'/>"), "beyond all numbers: m"));
   CHECK(said(actuator("<velocity name='m' joint='ball'/>"), "no hinge or slider here: m"));
   CHECK(said(actuator("<position name='m' site='s'/>"), "other things than joints"));
   CHECK(said(actuator("<position name='m' tendon='t'/>"), "no hinge or slider here: m"));
@@ -426,6 +433,13 @@ TEST_CASE("MJCF: actuators and armature that scenes lack are named, with what th
         std::string::npos);
   CHECK(refused("<motor name='m' joint='h' ctrlrange='1 -1'/>").find("ctrlrange") !=
         std::string::npos);
+  CHECK(refused("<motor name='m' joint='h' ctrllimited='maybe'/>").find("true, false or auto") !=
+        std::string::npos);
+  CHECK(refused("<motor name='m' joint='h'/><motor name='m' joint='h'/>").find("another one") !=
+        std::string::npos);
+  CHECK(refused("<motor name='m' joint='h'/></actuator><tendon><spatial name='t'/></tendon>"
+                "<actuator>")
+            .find("spatial \"t\": name: another one") != std::string::npos);
 }
 
 TEST_CASE("MJCF: limits more than a turn apart hold by a body that counts turns") {
@@ -480,6 +494,7 @@ TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with
     CHECK(why.rfind("robot.xml:", 0) == 0);
   };
   refused("<mujoco/>", "worldbody: is missing");
+  CHECK(mjcf_refusal("") == "robot.xml:1: is not XML that can be read: it is empty");
   refused(world("<body><joint type='screw'/><geom size='1'/></body>"),
           "must be hinge, slide, ball");
   refused(world("<body>\n<joint/><geom size='0'/></body>"),
