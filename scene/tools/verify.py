@@ -16,7 +16,7 @@ HOLDS = 1e-6  # of the arms of a joint, m; speeds the same
 
 # Numbers of a line; "+": or more; "t": then a text.
 LINES = {"body": "9t", "surface": "10", "pair": "7", "gravity": "3", "engine": "0t", "joint": "23t", "coupled": "2+", "step": "5",
-         "part": "4", "trial": "4", "extrapolated": "1", "start": "1", "instant": "2", "strike": "1", "push": "7t", "contact": "22",
+         "part": "4", "trial": "4", "extrapolated": "1", "start": "1", "instant": "2", "arrives": "1", "strike": "1", "push": "7t", "contact": "22",
          "pull": "14", "law": "10+", "via": "7", "placed": "8", "to": "14", "rate": "7", "end": "1"}
 
 
@@ -273,7 +273,7 @@ class Judge:
             self.until = n[2]
         elif word == "end":
             self.end_of_step(None)
-        elif word in ("part", "trial", "instant", "extrapolated", "start"):
+        elif word in ("part", "trial", "instant", "arrives", "extrapolated", "start"):
             self.block, self.when = (word, n), n[0]
 
     until = None
@@ -312,7 +312,9 @@ class Judge:
                 self.part(n, to)
             elif word == "extrapolated":
                 self.extrapolated(to)
-            elif word == "instant":
+            if word in ("instant", "arrives"):
+                self.follows(n[0], to)
+            if word == "instant":
                 self.instant(n, to)
             elif word == "start" and any(bodies[k].state for k in to):
                 self.judged["motion goes on"] += 1
@@ -417,7 +419,7 @@ class Judge:
             held, turns, z = joint.directions(states)
             if couples >= 0:
                 held, turns = ([z], []) if joint.kind == "slider" else ([], [z])
-            elif self.block[0] == "instant" and (joint.has_laws or any(m[0] == c[1] for c in self.coupled)) or joint.driven:
+            elif (self.block[0] == "instant" or self.block[1][1] == 0) and (joint.has_laws or any(m[0] == c[1] for c in self.coupled)) or joint.driven:
                 (held if joint.kind == "slider" else turns).append(z)
                 if joint.kind == "ball":
                     turns += [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]
@@ -593,6 +595,17 @@ class Judge:
         self.past = (self.past if self.past and self.past[-1]["events"] == n[1] else [])[-3:] + [now]
         if len(self.past) == 4:
             self.leads()
+
+    def follows(self, time, to):
+        """Places by the mean of the velocities, over whatever time has passed."""
+        for k, s in to.items():
+            b = self.bodies[k]
+            if b.state:
+                h = time - b.time
+                off = norm(add(add(s[:3], b.state[:3], -1), add(s[7:10], b.state[7:10]), -h / 2))
+                self.expect("time goes on", -h, 1e-9 * (1 + abs(time)), b.name)
+                self.expect("places follow velocities", off,
+                            1e-5 * (norm(s[:3]) + 0.1) + abs(h) / 4 * norm(add(s[7:10], b.state[7:10], -1)), b.name)
 
     def touch(self, m, load):
         """A contact that holds or slides at an instant."""

@@ -13,7 +13,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scene" / "
 import verify  # noqa: E402
 
 SCENES = {"rolling_sphere": 0.02, "icy_wedge": 0.01, "stack": 0.1, "cart": 0.02, "gripper": 0.02, "pulled_block": 0.2, "bricard": 0.2,
-          "clearance": 0.002}
+          "clearance": 0.002, "hanging_frame": 1.0}
 PART = 1e-3  # of a number: what a small fault changes
 
 

@@ -4,6 +4,7 @@
 
 #include "certificate/sheet.hpp"
 #include "effects/list.hpp"
+#include "joints/joint_rows.hpp"
 
 namespace tether::scene::certificate {
 
@@ -20,11 +21,20 @@ class InstantScribe final : public Source {
   InstantScribe& operator=(const InstantScribe&) = delete;
 
   void flush() override;
+  /// An impact at this time of bodies in the same places: velocities before and after, and its
+  /// contacts, with impulses in the place of forces. What they leave of it joints have done.
+  /// `exact`: velocities obey the law of impacts.
+  void put_impact(double time, const std::vector<BodyState>& before,
+                  const std::vector<BodyState>& after, const std::vector<ContactState>& contacts,
+                  bool exact);
 
  private:
   void put_pushes(std::string& out);
   void put_contacts(std::string& out) const;
   void put_joints(std::string& out) const;
+  void put_reactions(double time, const std::vector<BodyState>& after, Eigen::VectorXd momenta,
+                     std::string& out);
+  void set_places(double time, const std::vector<BodyState>& states);
   Vector3d surface_velocity(int body, const Vector3d& point) const;
   Vector3d centre(int body) const;
 
@@ -33,6 +43,8 @@ class InstantScribe final : public Source {
   Accelerations accelerations_;
   Sheet& sheet_;
   mechanics::Bodies bodies_;
+  joints::JointRows rows_;
+  std::vector<std::pair<int, joints::Coordinate>> laws_;  // of joints
   std::vector<std::unique_ptr<mechanics::Force>> forces_;
   std::vector<mechanics::Load6> loads_;
   double last_ = -1;  // s, written

@@ -161,6 +161,7 @@ class Judge {
              const Told& end);
   void extrapolated(const States& to);
   void hold(const States& to);
+  void follows(const States& to);
   void instant(const States& to);
   void touch(const JudgedContact& c);
   void accelerates(const JudgedBody& b, Instant::One& one, const Vector3d& a, const Vector3d& alpha,
@@ -273,7 +274,7 @@ void Judge::head(const Record& line) {
   if (word == "step" || word == "end")
     end_of_step(word == "step" ? std::optional(n[1]) : std::nullopt);
   if (word == "step") step_ = n[0], claimed_ = n[3], until_ = n[2];
-  for (const char* each : {"part", "trial", "instant", "extrapolated", "start"})
+  for (const char* each : {"part", "trial", "instant", "arrives", "extrapolated", "start"})
     if (word == each) block_ = line, when_ = n[0];
 }
 
@@ -314,6 +315,7 @@ void Judge::judge_block() {
   }
   if (word == "part" || word == "trial") part(to);
   if (word == "extrapolated") extrapolated(to);
+  if (word == "instant" || word == "arrives") follows(to);
   if (word == "instant") instant(to);
   for (const auto& [number, s] : to) {
     JudgedBody& b = body(number);
@@ -382,7 +384,7 @@ void Judge::pull_of(const JudgedJoint& joint, const std::vector<double>& n, bool
   JudgedJoint::Place p = joint.place(s);
   const bool slides = joint.kind == "slider";
   bool drives = joint.driven;
-  if (block_->word == "instant") {
+  if (block_->word == "instant" || block_->numbers[1] == 0) {
     drives = drives || joint.has_laws;
     for (const auto& [coupling, number] : coupled_) drives = drives || number == n[0];
   }
@@ -645,6 +647,18 @@ void Judge::extrapolated(const States& to) {
            b.name);
   }
   trial_.clear();
+}
+
+// Places by the mean of the velocities, over whatever time has passed.
+void Judge::follows(const States& to) {
+  for (const auto& [number, s] : to) {
+    const JudgedBody& b = body(number);
+    if (!b.state) continue;
+    const double h = when_ - b.time;
+    expect("time goes on", -h, kRounding * (1 + std::abs(when_)), b.name);
+    expect("places follow velocities", (s.x - b.state->x - h / 2 * (s.v + b.state->v)).norm(),
+           kLeads * (s.x.norm() + 0.1) + std::abs(h) / 4 * (s.v - b.state->v).norm(), b.name);
+  }
 }
 
 void Judge::touch(const JudgedContact& c) {

@@ -34,6 +34,7 @@ const std::map<std::string, Form, std::less<>>& forms() {
                                                                {"extrapolated", {1}},
                                                                {"start", {1}},
                                                                {"instant", {2}},
+                                                               {"arrives", {1}},
                                                                {"push", {7, false, true}},
                                                                {"contact", {22}},
                                                                {"pull", {14}},

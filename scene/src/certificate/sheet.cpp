@@ -39,6 +39,24 @@ void put_bodies(const Scene& scene, const std::map<std::string, int>& materials,
 
 }  // namespace
 
+Friction friction(const Scene& scene, int first, int second, const std::vector<BodyState>& states) {
+  const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;
+  Friction out;
+  out.associated = law == contact::Law::maximum_dissipation;
+  if (law == contact::Law::frictionless) return out;
+  for (const Pair& pair : scene.pairs)
+    for (const auto& [a, b] : {std::pair(first, second), std::pair(second, first)}) {
+      const Body &body = scene.bodies[at(a)], &other = scene.bodies[at(b)];
+      if (body.material != pair.first || other.material != pair.second) continue;
+      out.along = pair.friction;
+      out.across = pair.friction_across.value_or(pair.friction);
+      if (pair.is_elliptic())
+        out.axis = states[at(a)].orientation * body.friction_axis.value_or(Vector3d::Zero());
+      return out;
+    }
+  return out;
+}
+
 Sheet::Sheet(const Scene& scene) {
   std::string out = kCertificateHead;
   out += "1\n";

@@ -6,6 +6,7 @@
 #include <tether/scene/scene.hpp>
 
 #include "joints/rows.hpp"
+#include "natural_map.hpp"
 #include "output/files.hpp"
 
 namespace tether::scene::certificate {
@@ -44,6 +45,9 @@ class Line {
   }
   std::string& out_;
 };
+
+/// Friction of two bodies by the pairs of the scene and its law, in these places.
+Friction friction(const Scene& scene, int first, int second, const std::vector<BodyState>& states);
 
 /// Who has something to write that it does not know whole yet.
 class Source {

@@ -67,6 +67,12 @@ class Driver {
   Driver(Model& model, const DriverOptions& options, const Memory& memory);
   Memory memory() const;  ///< of the start of the present phase
 
+  /// Told of each impact: its contacts, their impulses by row, and the velocities before. `exact`:
+  /// its velocities obey the law of impacts.
+  using Struck = std::function<void(const ContactRows& rows, const VectorXd& x,
+                                    const VectorXd& before, bool exact)>;
+  void observe(Struck struck) { struck_ = std::move(struck); }
+
   /// To time t; early where `interrupted`, and where `excess` is above 0 first, a function of the
   /// state that the motion has the accelerations and forces of. Throws SimulationError.
   void advance(double t, const std::function<bool()>& interrupted = {},
@@ -107,7 +113,7 @@ class Driver {
   void record_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
                       const VectorXd& after, const VectorXd& x, double lost);
   bool has_accumulated(int contact, double approach, double& rest) const;
-  double come_to_rest(const std::vector<int>& touching, double speed);
+  double come_to_rest(const std::vector<int>& touching, double speed, VectorXd& x);
   void remember(int contact, double approach);
   /// The mode of a contact that an event has ended, by the function that was zero.
   struct Left {
@@ -165,6 +171,7 @@ class Driver {
   long at_one_time_ = 0;
   std::vector<bool> lifted_;  // at the time of the last event, whose forces vanished
   bool jammed_ = false;       // at this event
+  Struck struck_;             // empty: nobody asks
 };
 
 /// An impact of contacts that touch: the right hand side of its problem w = A x - b.

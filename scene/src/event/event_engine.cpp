@@ -102,7 +102,11 @@ class EventEngine : public ResumableEngine {
     if (to_certify_ && !scribe_)
       scribe_ = std::make_unique<certificate::InstantScribe>(
           *to_certify_, *this, [this] { return accelerations(); }, *to_certify_->certificate);
+    if (scribe_)
+      driver_->observe([this](const ContactRows& rows, const VectorXd& x, const VectorXd& before,
+                              bool exact) { put_impact(rows, x, before, exact); });
   }
+  void put_impact(const ContactRows& rows, const VectorXd& x, const VectorXd& before, bool exact);
   std::vector<std::array<Vector3d, 2>> accelerations() const;
   VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
   StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
@@ -208,6 +212,52 @@ void EventEngine::find_contact_states() const {
              (pair.elliptic ? model_->slip_of(contact) : model_->in_space(contact, slip));
     contacts_.push_back(c);
   }
+}
+
+// The model has the state after it.
+void EventEngine::put_impact(const ContactRows& rows, const VectorXd& x, const VectorXd& before,
+                             bool exact) {
+  std::vector<BodyState> after = bodies_;
+  const smooth::MovingBodies& bodies = model_->bodies();
+  bodies.read(model_->bodies_state(), after);
+  std::vector<BodyState> came = after;
+  for (int k = 0; k < bodies.count(); ++k) {
+    BodyState &end = after[at(bodies.body(k))], &start = came[at(bodies.body(k))];
+    start.velocity = before.segment<3>(6 * k);
+    start.angular_velocity = bodies.frame(k).R * before.segment<3>(6 * k + 3);
+    for (BodyState* each : {&start, &end}) {
+      smooth::to_si(units_, *each);
+      to_world(each->position);
+    }
+  }
+  const double impulse = units_.mass * units_.speed();
+  std::vector<ContactState> contacts;
+  std::vector<int> holders;
+  for (std::size_t k = 0; k < rows.contacts().size(); ++k) {
+    const int contact = rows.contacts()[k];
+    const Vector3d on_first = model_->is_law(contact)
+                                  ? Vector3d(Vector3d::Zero())
+                                  : model_->in_space(contact, rows.of(static_cast<int>(k), x));
+    if (model_->is_moment(contact)) {
+      const auto by = std::find(holders.begin(), holders.end(), model_->law(contact).held_by);
+      contacts[at(static_cast<int>(by - holders.begin()))].moment +=
+          impulse * units_.length * on_first;
+    }
+    if (!model_->is_pair(contact)) continue;
+    holders.push_back(contact);
+    const FeaturePair& pair = model_->pair(contact);
+    const Touch touch = pair.touch(bodies.all());
+    ContactState c;
+    c.first = pair.first;
+    c.second = pair.second;
+    c.point = units_.length * touch.point;
+    to_world(c.point);
+    c.normal = touch.normal;
+    c.gap = units_.length * touch.gap;
+    c.force = impulse * on_first;
+    contacts.push_back(c);
+  }
+  scribe_->put_impact(units_.time * model_->bodies().all().time, came, after, contacts, exact);
 }
 
 std::vector<std::array<Vector3d, 2>> EventEngine::accelerations() const {

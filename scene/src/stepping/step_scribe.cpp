@@ -224,25 +224,11 @@ double StepScribe::put_contacts(std::string& out, const StepContacts& contacts,
     };
     const Vector3d w = speed(c.first, c.r1) - speed(c.second, c.r2) + c.slip + c.bias * c.normal;
     const double inverse = b.motion[at(c.first)].inverse_mass + b.motion[at(c.second)].inverse_mass;
-    most = std::max(most, certificate::natural_residual(friction(c), c.normal, inverse * x, w));
+    most = std::max(most, certificate::natural_residual(
+                              certificate::friction(scene_, c.first, c.second, begin_), c.normal,
+                              inverse * x, w));
   }
   return most;
-}
-
-certificate::Friction StepScribe::friction(const PointContact& c) const {
-  certificate::Friction out{c.mu, c.mu, Vector3d::Zero()};
-  out.associated = stepper_.options().law == contact::Law::maximum_dissipation;
-  for (const Pair& pair : scene_.pairs) {
-    if (!pair.is_elliptic()) continue;
-    for (const auto& [first, second] : {std::pair(c.first, c.second), std::pair(c.second, c.first)})
-      if (scene_.bodies[at(first)].material == pair.first &&
-          scene_.bodies[at(second)].material == pair.second)
-        out = {pair.friction, *pair.friction_across,
-               begin_[at(first)].orientation *
-                   scene_.bodies[at(first)].friction_axis.value_or(Vector3d::Zero()),
-               out.associated};
-  }
-  return out;
 }
 
 bool StepScribe::hold(const std::vector<int>& bodies) const {

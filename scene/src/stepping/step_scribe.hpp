@@ -1,7 +1,6 @@
 // Tether: writes what steps do to the certificate. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "certificate/natural_map.hpp"
 #include "certificate/sheet.hpp"
 #include "stepping_engine.hpp"
 
@@ -47,7 +46,6 @@ class StepScribe final : public certificate::Source {
                   const std::vector<double>& impulses, int when);
   void put_laws(std::string& out, double t);
   void set_places(const std::vector<BodyState>& of);
-  certificate::Friction friction(const contact::PointContact& c) const;
   double put_contacts(std::string& out, const contact::StepContacts& contacts,
                       const std::vector<contact::PointContact>& solved,
                       const std::vector<BodyState>& velocities) const;
