@@ -29,6 +29,11 @@ struct PlacedCoordinate {
 };
 using Coordinates = std::map<std::string, PlacedCoordinate>;
 
+constexpr double kMost = 1e100;  // of the numbers of a scene, whose products are numbers, too
+constexpr const char* kBeyond = "actuators whose gains are beyond all numbers";
+
+bool is_number(double x) { return std::abs(x) < kMost; }
+
 // f(part, joint) for each joint of the draft.
 template <class F>
 void each_joint(const std::vector<Part>& parts, const F& f) {
@@ -59,7 +64,7 @@ std::optional<Coupling> coupling_of(const std::vector<Transmission>& terms,
   Coupling out;
   for (const Transmission& term : terms) {
     const auto found = coordinates.find(term.joint);
-    if (found == coordinates.end() || term.ratio == 0) return {};
+    if (found == coordinates.end() || term.ratio == 0 || !is_number(term.ratio)) return {};
     out.joints.push_back(static_cast<int>(found->second.joint));
     out.weights.push_back(term.ratio);
   }
@@ -140,6 +145,8 @@ class Driving {
     const auto [lower, upper] = drive.force.value_or(std::pair(-kInfinity, kInfinity));
     if (law[1] == 0 && law[2] == 0) {
       const double force = std::min(std::max(law[0], lower), upper);
+      if (!all_of(drive.to, [&](const Transmission& to) { return is_number(force * to.ratio); }))
+        return remarks_.add(kBeyond, drive.name);
       for (const Transmission& to : drive.to)
         if (force * to.ratio != 0)
           add_constant(scene_.joints[coordinates_.at(to.joint).joint], force * to.ratio, scene_);
@@ -167,8 +174,9 @@ class Driving {
       motor.target = r * (law[0] - mean) / motor.stiffness - along.value;
     else
       motor.rate = r * (law[0] - mean) / motor.damping;
-    if (!std::isfinite(motor.stiffness + motor.damping + motor.target + motor.rate))
-      return remarks_.add("actuators whose gains are beyond all numbers", drive.name);
+    if (!is_number(motor.stiffness) || !is_number(motor.damping) || !is_number(motor.target) ||
+        !is_number(motor.rate) || !is_number(r * mean))
+      return remarks_.add(kBeyond, drive.name);
     if (mean != 0) add_constant(joint, r * mean, scene_);
     joint.motor = motor;
   }
@@ -216,8 +224,8 @@ class Rotor {
     body.position = rail_.at = carried_.at;
     rail_.kind = JointKind::slider;
     rail_.first = static_cast<int>(scene.bodies.size());
-    rail_.axis = scene.gravity && scene.gravity->norm() > 0 ? scene.gravity->unitOrthogonal()
-                                                            : Vector3d::UnitX();
+    const Vector3d down = scene.gravity.value_or(Vector3d::Zero()).stableNormalized();
+    rail_.axis = down.norm() > 0 ? down.unitOrthogonal() : Vector3d::UnitX();
     Coupling coupling;
     coupling.name = rail_.name;
     coupling.joints = {static_cast<int>(scene.joints.size()), static_cast<int>(of_.joint)};
@@ -265,8 +273,12 @@ void add_common_laws(const Model& model, const std::vector<Part>& parts,
                               "drives ({:g} of the inertia)",
                               kSmallBody),
                   placed.law.name);
-    if (rotor.counts() || armature > 0)
-      rotor.add(armature > 0 ? armature : kSmallBody * inertia_about_joints(part), draft);
+    if (!rotor.counts() && !(armature > 0)) return;
+    const double mass = armature > 0 ? armature : kSmallBody * inertia_about_joints(part);
+    if (is_number(mass) && mass > 1 / kMost)
+      rotor.add(mass, draft);
+    else
+      remarks.add("rotors whose inertia is beyond 1e100 or below 1e-100", placed.law.name);
   });
 }
 

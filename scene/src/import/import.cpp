@@ -87,7 +87,13 @@ Imported convert(std::string_view text, const std::string& file, const ImportOpt
   out.toml = with_comments(write_scene(draft.scene), "body", draft.body_comments);
   out.toml = heading(model, file, draft, out.remarks) +
              with_comments(out.toml, "joint", draft.joint_comments);
-  parse_scene(out.toml, "the scene made of " + file);  // throws where it is none
+  try {
+    parse_scene(out.toml, "the scene");
+  } catch (const SceneError& e) {
+    problems.add(document.root().GetLineNum(), "", "",
+                 "has numbers that no scene has: " + e.problems().front().message());
+    problems.finish();
+  }
   return out;
 }
 

@@ -121,6 +121,9 @@ void Reader::replicate(const Node& node, int of, const Around& around) {
   Around copy = around;
   copy.class_name = tag.text("childclass", around.class_name);
   const std::string separator = tag.text("sep");
+  constexpr std::size_t kLongestSuffix = 200;  // bytes
+  if (!files::is_name("x" + separator) || separator.size() + around.suffix.size() > kLongestSuffix)
+    return tag.wrong("sep", std::string("must be part of a name: it ") + files::kName);
   tag.finish(model_.remarks);
   const std::size_t digits = fmt::format("{}", count).size();
   Vector3d at = Vector3d::Zero();

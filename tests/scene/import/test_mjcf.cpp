@@ -504,7 +504,13 @@ TEST_CASE("an MJCF that is wrong, or asks for more than is read, is refused with
   refused(world("<body><joint class='none'/><geom size='1'/></body>"), "no <default>");
   refused(world("<body name='a'/><body name='a'/>"), "another body");
   refused(world("<composite type='grid'/>"), "is not read");
+  refused(world("<geom type='plane' size='1 1 1'/><body><freejoint/><geom size='1' "
+                "friction='1e160'/></body>"),
+          "has numbers that no scene has: the scene:");
   refused(world("<replicate count='1.5'/>"), "whole number");
+  refused(world("<replicate count='2' sep='(' ><body/></replicate>"), "sep = \"(\": must be part");
+  refused(world("<replicate count='2' sep='" + std::string(300, 'x') + "'><body/></replicate>"),
+          "must be part of a name");
   refused(
       world("<replicate count='90000'><replicate count='90000'><body/></replicate></replicate>"),
       "all copies have at most 100000 bodies and geoms");
