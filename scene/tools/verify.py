@@ -12,12 +12,15 @@ import sys
 BALANCE = 1e-6  # of the impulses or forces on a body
 LAW = 1e-6  # of the speeds at contacts
 EQUATIONS = 1e-5  # of the forces at an instant
+USEFUL = 1e-2  # residual of a problem whose solution a step may use
 HOLDS = 1e-6  # of the arms of a joint, m; speeds the same
 
 # Numbers of a line; "+": or more; "t": then a text.
 LINES = {"body": "9t", "surface": "10", "pair": "7", "gravity": "3", "engine": "0t", "joint": "23t", "coupled": "2+", "step": "5",
          "part": "4", "trial": "4", "extrapolated": "1", "start": "1", "instant": "2", "arrives": "1", "strike": "1", "push": "7t", "contact": "22",
          "pull": "14", "law": "10+", "via": "7", "placed": "8", "to": "14", "rate": "7", "end": "1"}
+
+LONGEST = 1 << 16  # of a line
 
 
 class Damaged(Exception):
@@ -187,9 +190,9 @@ def read(file):
     """Words, numbers and texts of its lines; Damaged where it is none, or not whole."""
     count, word = 0, None
     with open(file, encoding="utf-8", errors="replace") as lines:
-        for line in lines:
+        for line in iter(lambda: lines.readline(LONGEST), ""):
             if not line.endswith("\n"):
-                raise Damaged(f"line {count + 1} is cut")
+                raise Damaged(f"line {count + 1} is cut, or longer than any")
             if count == 0 and line != "tether certificate 1\n":
                 raise Damaged("it is no certificate of this format")
             if word == "end":
@@ -237,7 +240,7 @@ class Judge:
             else:
                 self.finish()
                 self.head(word, n, text)
-        if not self.judged:
+        if not self.moved:
             raise Damaged("nothing moves in it")
         return self
 
@@ -270,13 +273,15 @@ class Judge:
         elif word == "step":
             self.end_of_step(n[1])
             self.step, self.claimed = n[0], n[3]
+            self.expect("contact problems solved", abs(n[4] - 1), 0, "step")
+            self.expect("residual of contact problems", abs(n[3]), USEFUL, "step")
             self.until = n[2]
         elif word == "end":
             self.end_of_step(None)
         elif word in ("part", "trial", "instant", "arrives", "extrapolated", "start"):
             self.block, self.when = (word, n), n[0]
 
-    until = None
+    until, moved = None, False
 
     def end_of_step(self, start):
         """All bodies have reached the end of the step before, where the next one begins."""
@@ -290,14 +295,16 @@ class Judge:
 
     def expect(self, law, amount, bound, what):
         self.judged[law] += 1
-        if not amount <= bound:
+        if not (amount <= bound < math.inf):
             self.faults.append(f"step {self.step:g}, t = {self.when:g} s: {what}: {law}: {amount:.3g}, at most {bound:.3g}")
 
     def finish(self):
         """Judges the block that has been read."""
         if self.block is None:
             for _, n, _ in self.lines:
-                self.bodies[n[0]].state = n[1:]
+                self.bodies[n[0]].state, name = n[1:], self.bodies[n[0]].name
+                self.expect("unit orientation", abs(norm(n[4:8]) - 1), 1e-9, name)
+                self.expect("fixed bodies rest", norm(n[8:11]) + norm(n[11:14]), 0, name)
         else:
             (word, n), bodies = self.block, self.bodies
             to = {line[0]: line[1:] for kind, line, _ in self.lines if kind == "to"}
@@ -319,6 +326,7 @@ class Judge:
             elif word == "start" and any(bodies[k].state for k in to):
                 self.judged["motion goes on"] += 1
                 self.expect("motion goes on", max(norm(add(bodies[k].state, s, -1)) for k, s in to.items()), 1e-6, "all bodies")
+            self.moved = self.moved or bool(to)
             for k, state in to.items():
                 bodies[k].state, bodies[k].time = state, n[0] + (n[1] if word in ("part", "trial") else 0)
                 self.expect("unit orientation", abs(norm(state[3:7]) - 1), 1e-9, bodies[k].name)
@@ -515,7 +523,8 @@ class Judge:
                 if not composed:
                     self.expect("limit", min(abs(min(x * inverse, speed - f)) for f in floors), 1e-4 * scale, what)
             else:
-                self.expect("bound", abs(x), bound * dt * (1 + 1e-6), what)
+                if bound < math.inf:
+                    self.expect("bound", abs(x), bound * dt * (1 + 1e-6), what)
                 wanted = speed - rate
                 y = -dt * (stiffness * (stretch + dt * wanted) + damping * wanted) if law == 2 else x - wanted / (inverse or 1)
                 if not composed:

@@ -3,8 +3,10 @@
 
     verify_faults.py TETHER SCENES"""
 import math
+import os
 import pathlib
 import random
+import resource
 import subprocess
 import sys
 import tempfile
@@ -125,8 +127,27 @@ def turned_body(random_, lines):
     put(lines, k + 20, n)
 
 
+def beyond_numbers(random_, lines):
+    """Bounds that are parts of the speeds must not grow with them beyond all numbers."""
+    k, n = pick(random_, lines[20:], "to")
+    n[8 + random_.randrange(3)] = 10.0 ** random_.choice((153, 160, 200, 308))
+    put(lines, k + 20, n)
+
+
+def moving_ground(random_, lines):
+    k, n = pick(random_, lines[:20], "to")
+    n[8 + random_.randrange(3)] = PART
+    put(lines, k, n)
+
+
+def unsolved(random_, lines):
+    k, n = pick(random_, lines, "step")
+    n[3:5] = random_.choice(([n[3], 0.0], [1e9, 1.0]))
+    put(lines, k, n)
+
+
 FAULTS = (off_the_cone, swapped_sign, turned_friction, weaker_contact, lost_contact, other_mass, shifted, faster, joints_pull,
-          residual_claimed, lost_push, turned_body)
+          residual_claimed, lost_push, turned_body, beyond_numbers, moving_ground, unsolved)
 
 
 def judged(program, file, lines):
@@ -144,6 +165,13 @@ def damaged(random_, program, file, lines):
                   text.replace("to 1 ", "to 77 "), text.replace("\npart", "\nlaw")):
         if judged(program, file, [wrong]) != (2, 2):
             bad.append(wrong[:40])
+    file.write_text(lines[0])
+    os.truncate(file, 1 << 34)  # a line that takes all memory
+    for command in ([program, "verify"], [sys.executable, verify.__file__]):
+        run = subprocess.run([*command, str(file)], capture_output=True, text=True, timeout=60,
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)))
+        if run.returncode != 2 or "longer than any" not in run.stdout + run.stderr:
+            bad.append(f"16 GiB without an end of line: {run.returncode}")
     for _ in range(100):
         at, wild = random_.randrange(len(text)), random_.choice(["\0", "e999", "-", "nan", " ", "\n", "1e308", "\xff"])
         file.write_text(text[:at] + wild + text[at + 1:])

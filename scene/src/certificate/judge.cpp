@@ -22,6 +22,7 @@ using Eigen::Matrix3d;
 
 constexpr double kBalance = 1e-6;    // of the impulses or forces on a body
 constexpr double kLaw = 1e-6;        // of the speeds at contacts
+constexpr double kUseful = 1e-2;     // residual of a problem whose solution a step may use
 constexpr double kHolds = 1e-6;      // of the arms and speeds of a joint
 constexpr double kRounding = 1e-9;   // of places, times and frames
 constexpr double kEquations = 1e-5;  // of the forces at an instant
@@ -139,6 +140,7 @@ class Judge {
       if (line.word == word) f(line.numbers, line.text);
   }
 
+  void rests(JudgedBody& b, const Told& s);
   void judge_block();
   void part(const States& to);
   void push(double factor, const States& to, Loads& loads);
@@ -174,7 +176,7 @@ class Judge {
   std::map<double, JudgedJoint> joints_;
   std::vector<std::pair<double, double>> coupled_;  // coupling, joint
   Vector3d gravity_ = Vector3d::Zero();
-  bool keeps_momentum_ = true, associated_ = false, frictionless_ = false;
+  bool keeps_momentum_ = true, associated_ = false, frictionless_ = false, moved_ = false;
   double step_ = 0, when_ = 0, claimed_ = 0;
   std::optional<double> until_;
   std::optional<Record> block_;
@@ -203,7 +205,7 @@ Verdict Judge::run(const std::string& file) {
     finish();
     head(line);
   }
-  if (verdict_.judged == 0) throw Damaged("nothing moves in it");
+  if (!moved_) throw Damaged("nothing moves in it");
   return std::move(verdict_);
 }
 
@@ -224,7 +226,7 @@ Told Judge::state(double number, const States* to) const {
 
 void Judge::expect(const char* law, double amount, double bound, const std::string& what) {
   ++verdict_.judged;
-  if (amount <= bound) return;
+  if (amount <= bound && bound < INFINITY) return;  // a bound beyond all numbers bounds nothing
   if (++verdict_.broken > static_cast<long>(kTold)) return;
   verdict_.faults.push_back(fmt::format("step {}, t = {} s: {}: {}: {:.3g}, at most {:.3g}", step_,
                                         when_, what, law, amount, bound));
@@ -273,7 +275,11 @@ void Judge::head(const Record& line) {
   }
   if (word == "step" || word == "end")
     end_of_step(word == "step" ? std::optional(n[1]) : std::nullopt);
-  if (word == "step") step_ = n[0], claimed_ = n[3], until_ = n[2];
+  if (word == "step") {
+    step_ = n[0], claimed_ = n[3], until_ = n[2];
+    expect("contact problems solved", std::abs(n[4] - 1), 0, "step");
+    expect("residual of contact problems", std::abs(claimed_), kUseful, "step");
+  }
   for (const char* each : {"part", "trial", "instant", "arrives", "extrapolated", "start"})
     if (word == each) block_ = line, when_ = n[0];
 }
@@ -289,11 +295,18 @@ void Judge::end_of_step(std::optional<double> start) {
 
 void Judge::finish() {
   if (!block_)
-    for (const Record& line : lines_) body(line.numbers[0]).state = told(line.numbers, 1);
+    for (const Record& line : lines_) rests(body(line.numbers[0]), told(line.numbers, 1));
   else
     judge_block();
   block_.reset();
   lines_.clear();
+}
+
+// Outside of blocks places of fixed bodies are told.
+void Judge::rests(JudgedBody& b, const Told& s) {
+  expect("unit orientation", std::abs(s.q.norm() - 1), kRounding, b.name);
+  expect("fixed bodies rest", s.v.norm() + s.w.norm(), 0, b.name);
+  b.state = s;
 }
 
 void Judge::judge_block() {
@@ -317,6 +330,7 @@ void Judge::judge_block() {
   if (word == "extrapolated") extrapolated(to);
   if (word == "instant" || word == "arrives") follows(to);
   if (word == "instant") instant(to);
+  moved_ = moved_ || !to.empty();
   for (const auto& [number, s] : to) {
     JudgedBody& b = body(number);
     if (word == "start" && b.state) expect("motion goes on", apart(*b.state, s), 1e-6, b.name);
@@ -553,7 +567,7 @@ void Judge::laws(double dt, const States& mid) {
   each("law", [&](const auto& n, const auto&) {
     const auto joint = joints_.find(n[0]);
     if (joint == joints_.end()) throw Damaged("a law of a joint that is not told");
-    const double gap = n[2], rate = n[4], bound = n[5] * dt, x = n[9];
+    const double gap = n[2], rate = n[4], bound = dt > 0 ? n[5] * dt : 0, x = n[9];
     double speed = 0, came = 0, inverse = 0;
     for (std::size_t i = 10; i + 6 < n.size(); i += 7) {
       const JudgedBody& b = body(n[i]);
@@ -575,7 +589,7 @@ void Judge::laws(double dt, const States& mid) {
       if (!composed) expect("limit", off, scale, what);
       return;
     }
-    expect("bound", std::abs(x), bound * (1 + kBalance), what);
+    if (bound < INFINITY) expect("bound", std::abs(x), bound * (1 + kBalance), what);
     const double wanted = speed - rate;
     const double y = n[1] == 2 ? -dt * (n[7] * (n[6] + dt * wanted) + n[8] * wanted)
                                : x - wanted / std::max(inverse, 1e-300);

@@ -53,7 +53,7 @@ void Reader::refuse(const std::string& what) const {
   throw Damaged(fmt::format("line {}: {}", line_, what));
 }
 
-Reader::Reader(const std::string& file) : in_(file, std::ios::binary) {
+Reader::Reader(const std::string& file) : in_(file, std::ios::binary), buffer_(kLongest + 2) {
   std::string head(std::string_view(kCertificateHead).size() + 2, '\0');
   in_.read(head.data(), static_cast<std::streamsize>(head.size()));
   if (!in_ || head != std::string(kCertificateHead) + "1\n")
@@ -61,14 +61,15 @@ Reader::Reader(const std::string& file) : in_(file, std::ios::binary) {
 }
 
 bool Reader::next(Record& out) {
-  std::string line;
   ++line_;
-  if (!std::getline(in_, line)) {
+  in_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+  if (in_.gcount() == 0) {
     if (!ended_) refuse("the end is missing: the file was cut");
     return false;
   }
   if (ended_) refuse("it goes on behind its end");
-  if (in_.eof() || line.size() > kLongest) refuse("it is cut, or longer than any");
+  if (!in_ || in_.eof()) refuse("it is cut, or longer than any");
+  const std::string_view line(buffer_.data(), static_cast<std::size_t>(in_.gcount()) - 1);
   const std::size_t blank = std::min(line.find(' '), line.size());
   out.word = line.substr(0, blank);
   const auto form = forms().find(out.word);

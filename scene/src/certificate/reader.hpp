@@ -32,6 +32,7 @@ class Reader {
   [[noreturn]] void refuse(const std::string& what) const;
 
   std::ifstream in_;
+  std::vector<char> buffer_;  // of a line
   long line_ = 1;
   bool ended_ = false;
 };
