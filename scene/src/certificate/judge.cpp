@@ -91,17 +91,17 @@ struct JudgedPair {
 };
 
 struct JudgedContact {
-  explicit JudgedContact(const std::vector<double>& n)
-      : first(n[0]),
-        second(n[1]),
-        on_first(vector(n, 2)),
-        on_second(vector(n, 5)),
-        n(vector(n, 8)),
-        gap(n[11]),
-        bias(n[12]),
-        slip(vector(n, 13)),
-        x(vector(n, 16)),
-        moment(vector(n, 19)) {}
+  explicit JudgedContact(const std::vector<double>& m)
+      : first(m[0]),
+        second(m[1]),
+        on_first(vector(m, 2)),
+        on_second(vector(m, 5)),
+        n(vector(m, 8)),
+        gap(m[11]),
+        bias(m[12]),
+        slip(vector(m, 13)),
+        x(vector(m, 16)),
+        moment(vector(m, 19)) {}
   const Vector3d& on(double body) const { return body == first ? on_first : on_second; }
   double first, second;
   Vector3d on_first, on_second, n;
