@@ -12,6 +12,7 @@ import sys
 BALANCE = 1e-6  # of the impulses or forces on a body
 LAW = 1e-6  # of the speeds at contacts
 EQUATIONS = 1e-5  # of the forces at an instant
+TIMES = 1e-15  # of times: their rounding
 USEFUL = 1e-2  # residual of a problem whose solution a step may use
 HOLDS = 1e-6  # of the arms of a joint, m; speeds the same
 
@@ -358,7 +359,7 @@ class Judge:
             if bodies[k].state is None:
                 raise Damaged(f"body {bodies[k].name} has no state at {start:g} s")
             self.expect("time goes on", abs(bodies[k].time - start), 1e-9 * (1 + abs(start)), bodies[k].name)
-        loads = {k: [[0.0] * 3, [0.0] * 3, 0.0, 0.0, False] for k in to}  # P, L about the centre, scales, touched
+        loads = {k: [[0.0] * 3, [0.0] * 3, 0.0, 0.0] for k in to}  # P, L about the centre, scales
         late = {k: [[0.0] * 3, [0.0] * 3] for k in to}
 
         def load(k, force, torque, on=loads):
@@ -374,7 +375,7 @@ class Judge:
                 if text == "gravity":
                     pushed[m[0]] += 1
                     self.expect("weight", norm(add(m[1:4], self.gravity, -dt * self.index(m[0]).mass)),
-                                1e-9 * dt * bodies[m[0]].mass * norm(self.gravity), bodies[m[0]].name)
+                                (1e-9 * dt + TIMES * (1 + abs(start))) * bodies[m[0]].mass * norm(self.gravity), bodies[m[0]].name)
         if norm(self.gravity) > 0 and dt > 0:
             for k in to:
                 self.expect("weight acts", 1 - pushed[k], 0, bodies[k].name)
@@ -393,8 +394,6 @@ class Judge:
                     if self.index(k).mass > 0:
                         arm = add(p, bodies[k].state[:3], -1)
                         load(k, scaled(m[16:19], sign), scaled(add(m[19:22], cross(arm, m[16:19])), sign))
-                        if k in loads and norm(m[16:19]) > 0:
-                            loads[k][4] = True
         mid = {k: (b.state[7:10], b.state[10:13]) for k, b in bodies.items() if b.state}
         for k in to:
             b = bodies[k]
@@ -455,7 +454,9 @@ class Judge:
 
     def contacts(self, dt, composed, claimed, free, mid):
         states, lines = {k: b.state for k, b in self.bodies.items()}, [m for kind, m, _ in self.lines if kind == "contact"]
-        worst, speed, name = 0.0, 0.0, ""
+        worst, speed, name, near = 0.0, 0.0, "", collections.defaultdict(list)
+        for m in lines:
+            near[m[0], m[1]].append(m[2:5])
         for m in lines:
             first, second, n, gap, bias, slip, x, moment = m[0], m[1], m[8:11], m[11], m[12], m[13:16], m[16:19], m[19:22]
             points = {first: m[2:5], second: m[5:8]}
@@ -468,21 +469,32 @@ class Judge:
             push, tangent = dot(x, n), add(x, n, -dot(x, n))
             self.expect("points of contact", norm(add(m[5:8], m[2:5], -1)), abs(gap) * (1 + 1e-6) + 1e-9 * (1 + norm(m[2:5])), what)
             self.expect("unit normal", abs(norm(n) - 1), 1e-9, what)
-            self.expect("contacts push", -push, BALANCE * norm(x), what)
-            self.expect("Coulomb's cone", norm(tangent), max(friction[:2]) * push + BALANCE * norm(x), what)
             spin = dot(moment, n)
             self.expect("moments of friction", max(abs(spin) - torsional * push, norm(add(moment, n, -spin)) - rolling * push),
                         BALANCE * push, what)
             inverse = sum(1 / self.bodies[k].mass for k in (first, second) if self.bodies[k].mass > 0)
+            most = max(norm(came), norm(comes))
+            tiny = BALANCE * norm(x) + (1e-9 * most / inverse if inverse > 0 else 0)
+            self.expect("contacts push", -push, tiny, what)
+            self.expect("Coulomb's cone", norm(tangent), max(friction[:2]) * push + tiny, what)
             w = add(add(after, slip), n, bias)
             off = natural_residual(friction, n, scaled(x, inverse), w)
             turning = sum(norm(states[k][10:13]) + norm(mid[k][1]) for k in (first, second))
-            fast = sum(norm(states[k][7:10]) + norm(mid[k][0]) + norm(mid[k][1]) * norm(add(points[k], states[k][:3], -1)) for k in (first, second))
+            fast = sum(norm(states[k][7:10]) + norm(mid[k][0]) + norm(free[k][0]) + norm(mid[k][1]) * norm(add(points[k], states[k][:3], -1)) for k in (first, second))
             speed = max(speed, norm(came) + norm(comes) + norm(slip) + abs(bias) + norm(x) * inverse + norm(self.gravity) * dt)
             if off > worst:
                 worst, name = off, what
-            # The middle of the sub-step, with its frame, is this far from the start.
-            middle = dt * turning * fast + 1e-9 * (1 + fast)
+            # The middle of the sub-step is this far from the start: bodies turn, their normal does along an edge,
+            # and points move in their face, or along a curve: an ellipsoid's radius is at most a^2 / height.
+            moving = [k for k in (first, second) if self.bodies[k].mass > 0]
+            arms = [max(norm(add(points[k], states[k][:3], -1)), 1e-300) for k in moving]
+            heights = [max(abs(dot(n, add(points[k], states[k][:3], -1))), 1e-300) for k in moving]
+            flat = max((5 * sum(self.bodies[k].inertia[i][i] for i in range(3)) / self.bodies[k].mass / height
+                        for k, height in zip(moving, heights)), default=0.0)
+            patch = max(norm(add(other, m[2:5], -1)) for other in near[first, second])
+            spins = norm(add(free[first][1], free[second][1], -1))
+            middle = dt * turning * fast + spins * patch + dt * spins * spins * flat + 1e-9 * (1 + fast)
+            middle += dt * most * most / min(arms, default=math.inf)
             approach, comes_n = -dot(came, n), -dot(comes, n)
             allowed = [max(gap, 0.0) / dt if dt > 0 else 0.0]
             if comes_n * dt > gap or dt == 0:
@@ -549,7 +561,7 @@ class Judge:
         # Positions: by the velocity that the sub-step ends with, or along the parabola of free fall.
         v = add(v1, late[0], -1 / b.mass)
         moved = add(add(x1, placed[:3], -1), v, -dt)
-        if norm(moved) > 1e-9 * (norm(x1) + dt * norm(v)) and not load[4]:
+        if norm(moved) > 1e-9 * (norm(x1) + dt * norm(v)):
             moved = add(moved, self.gravity, dt * dt / 2)
         self.expect("places move as velocities", norm(moved), 1e-9 * (norm(x1) + dt * norm(v)) + 1e-6 * dt * norm(v), b.name)
         if momentum:

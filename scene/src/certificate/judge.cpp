@@ -24,6 +24,7 @@ constexpr double kBalance = 1e-6;    // of the impulses or forces on a body
 constexpr double kLaw = 1e-6;        // of the speeds at contacts
 constexpr double kUseful = 1e-2;     // residual of a problem whose solution a step may use
 constexpr double kHolds = 1e-6;      // of the arms and speeds of a joint
+constexpr double kTimes = 1e-15;     // of times: their rounding
 constexpr double kRounding = 1e-9;   // of places, times and frames
 constexpr double kEquations = 1e-5;  // of the forces at an instant
 constexpr double kInstant = 1e-4;    // of accelerations and speeds of smooth motion
@@ -54,7 +55,6 @@ Told told(const std::vector<double>& n, std::size_t k) {
 struct Load {
   Vector3d force = Vector3d::Zero(), torque = Vector3d::Zero();
   double forces = 0, torques = 0;
-  bool touched = false;
   void add(const Vector3d& f, const Vector3d& m) {
     force += f, torque += m;
     forces += f.norm(), torques += m.norm();
@@ -149,8 +149,8 @@ class Judge {
                const Told (&s)[2]);
   void load_contact(const JudgedContact& c, Loads& loads);
   void contacts(double dt, const States& free, const States& mid);
-  double contact(const JudgedContact& c, double dt, const States& free, const States& mid,
-                 double& speed);
+  double contact(const JudgedContact& c, double patch, double dt, const States& free,
+                 const States& mid, double& speed);
   void moments(const JudgedContact& c, const JudgedPair& pair, const std::string& what);
   std::pair<Friction, JudgedPair> friction(const JudgedContact& c);
   std::string name_of(const JudgedContact& c) {
@@ -364,7 +364,10 @@ void Judge::push(double factor, const States& to, Loads& loads) {
     if (effect != "gravity") return;
     ++weights[n[0]];
     const Vector3d weight = factor * body(n[0]).mass * gravity_;
-    expect("weight", (vector(n, 1) - weight).norm(), kRounding * weight.norm(), body(n[0]).name);
+    // The time of a short part is the difference of two.
+    const double rounding = kTimes * (1 + std::abs(when_)) * body(n[0]).mass * gravity_.norm();
+    expect("weight", (vector(n, 1) - weight).norm(), kRounding * weight.norm() + rounding,
+           body(n[0]).name);
   });
   if (!gravity_.isZero(0) && factor > 0)
     for (const auto& [number, s] : to)
@@ -431,7 +434,6 @@ void Judge::load_contact(const JudgedContact& c, Loads& loads) {
     if (load == loads.end()) continue;
     const Vector3d arm = c.on(number) - state(number).x;
     load->second.add(sign * c.x, sign * (c.moment + arm.cross(c.x)));
-    load->second.touched = load->second.touched || !c.x.isZero(0);
   }
 }
 
@@ -509,18 +511,25 @@ void Judge::contacts(double dt, const States& free, const States& mid) {
   const double claimed = block_->numbers[3];
   double worst = 0, speed = 0;
   std::string name = "contacts";
+  std::map<std::pair<double, double>, std::vector<Vector3d>> points;
+  each("contact", [&](const auto& n, const auto&) {
+    points[{n[0], n[1]}].push_back(vector(n, 2));
+  });
   each("contact", [&](const auto& n, const auto&) {
     const JudgedContact c(n);
-    const double off = contact(c, dt, free, mid, speed);
+    double patch = 0;
+    for (const Vector3d& p : points[{n[0], n[1]}]) patch = std::max(patch, (p - c.on_first).norm());
+    const double off = contact(c, patch, dt, free, mid, speed);
     if (off > worst) worst = off, name = name_of(c);
   });
   expect("residual as claimed", std::abs(claimed - worst), 1e-4 * worst + kRounding * speed, name);
   if (!composed) expect("law of contact", worst, std::max(kLaw, 1e2 * claimed_) * speed, name);
 }
 
-// Returns its natural residual; `speed`: the largest so far.
-double Judge::contact(const JudgedContact& c, double dt, const States& free, const States& mid,
-                      double& speed) {
+// Returns its natural residual; `patch`: how far the other points of both bodies are; `speed`: the
+// largest so far.
+double Judge::contact(const JudgedContact& c, double patch, double dt, const States& free,
+                      const States& mid, double& speed) {
   const std::string what = name_of(c);
   const auto [law, pair] = friction(c);
   const Told s[2] = {state(c.first), state(c.second)};
@@ -529,26 +538,40 @@ double Judge::contact(const JudgedContact& c, double dt, const States& free, con
   };
   const Vector3d came = relative(s[0], s[1]), comes = relative(free.at(c.first), free.at(c.second));
   const Told end[2] = {mid.at(c.first), mid.at(c.second)};
+  const Told comes_as[2] = {free.at(c.first), free.at(c.second)};
   const double push = c.x.dot(c.n), size = c.x.norm();
   expect("points of contact", (c.on_first - c.on_second).norm(),
          std::abs(c.gap) * (1 + kLaw) + kRounding * (1 + c.on_first.norm()), what);
   expect("unit normal", std::abs(c.n.norm() - 1), kRounding, what);
-  expect("contacts push", -push, kBalance * size, what);
-  expect("Coulomb's cone", (c.x - push * c.n).norm(),
-         std::max(law.along, law.across) * push + kBalance * size, what);
   moments(c, pair, what);
-  double inverse = 0, turning = 0, fast = 0;
+  double inverse = 0, turning = 0, fast = 0, round = INFINITY, flat = 0;
   for (int k = 0; k < 2; ++k) {
     const JudgedBody& b = body(k == 0 ? c.first : c.second);
-    if (b.mass > 0) inverse += 1 / b.mass;
+    const Vector3d from = c.on(k == 0 ? c.first : c.second) - s[k].x;
+    const double arm = from.norm(), height = std::abs(from.dot(c.n));
+    if (b.mass > 0) {
+      inverse += 1 / b.mass;
+      round = std::min(round, arm);
+      flat = std::max(flat, 5 * b.inertia.trace() / b.mass / std::max(height, 1e-300));
+    }
     turning += s[k].w.norm() + end[k].w.norm();
-    fast += s[k].v.norm() + end[k].v.norm() +
-            end[k].w.norm() * (c.on(k == 0 ? c.first : c.second) - s[k].x).norm();
+    fast += s[k].v.norm() + end[k].v.norm() + comes_as[k].v.norm() + end[k].w.norm() * arm;
   }
+  const double most = std::max(came.norm(), comes.norm());
+  const double tiny = kBalance * size + (inverse > 0 ? kRounding * most / inverse : 0);
+  expect("contacts push", -push, tiny, what);
+  expect("Coulomb's cone", (c.x - push * c.n).norm(), std::max(law.along, law.across) * push + tiny,
+         what);
   speed = std::max(speed, came.norm() + comes.norm() + c.slip.norm() + std::abs(c.bias) +
                               size * inverse + gravity_.norm() * dt);
-  // Laws hold in the middle of the sub-step, whose frames and points are this far from its start.
-  const double middle = dt * turning * fast + kRounding * (1 + fast);
+  // Laws hold in the middle of the sub-step, whose frames and points are this far from its start:
+  // bodies turn, their normal does along an edge, and points move in their face, or along a curve:
+  // an ellipsoid's radius is at most a^2 / height, and a^2 5/2 of trace / mass; twice that, as mass
+  // may lie inside.
+  const double bends = most > 0 ? dt * most * most / std::max(round, 1e-300) : 0;
+  const double rolls = dt * (comes_as[0].w - comes_as[1].w).squaredNorm() * flat;
+  const double middle = dt * turning * fast + (comes_as[0].w - comes_as[1].w).norm() * patch +
+                        bends + rolls + kRounding * (1 + fast);
   const double approach = -came.dot(c.n), approaches = -comes.dot(c.n);
   double off = std::abs(c.bias - (dt > 0 ? std::max(c.gap, 0.0) / dt : 0));
   if (approaches * dt > c.gap || dt == 0)
@@ -610,7 +633,7 @@ void Judge::moves(const JudgedBody& b, double dt, const Load& load, const Load& 
   const Vector3d v = end.v - late.force / b.mass;
   Vector3d left = end.x - placed.x - dt * v;
   const double rounding = kRounding * (end.x.norm() + dt * v.norm());
-  if (left.norm() > rounding && !load.touched) left += 0.5 * dt * dt * gravity_;
+  if (left.norm() > rounding) left += 0.5 * dt * dt * gravity_;
   expect("places move as velocities", left.norm(), rounding + 1e-6 * dt * v.norm(), b.name);
   double gaps = 0;
   each("contact", [&](const auto& n, const auto&) { gaps += std::abs(n[11]); });
