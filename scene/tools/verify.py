@@ -398,10 +398,10 @@ class Judge:
         for k in to:
             b = bodies[k]
             mid[k] = (add(b.state[7:10], loads[k][0], 1 / b.mass), add(b.state[10:13], b.unspin(b.state[3:7], loads[k][1])))
-        via = {m[0]: (m[1:4], m[4:7]) for kind, m, _ in self.lines if kind == "via"}
+        via = {m[0]: (m[1:4], m[4:7]) for kind, m, _ in self.lines if kind == "via" and self.index(m[0])}
         self.contacts(dt, composed, claimed, free, {**mid, **via})
         self.laws(dt, composed, {**mid, **via})
-        placed = {m[0]: m[1:] for kind, m, _ in self.lines if kind == "placed"}
+        placed = {m[0]: m[1:] for kind, m, _ in self.lines if kind == "placed" and self.index(m[0])}
         reach = sum(abs(m[11]) for kind, m, _ in self.lines if kind == "contact")
         for k in to:
             self.moves(bodies[k], dt, loads[k], late[k], placed.get(k, bodies[k].state[:7]), to[k], reach)

@@ -162,7 +162,8 @@ def damaged(random_, program, file, lines):
     """What is cut, or of wild bytes, is no certificate; what is accepted of it, or crashes."""
     text, bad = "".join(lines), []
     for wrong in ("", text[:-5], text[: len(text) // 2], "tether certificate 1\n", text.replace("engine", "motor", 1), text + "to 0\n",
-                  text.replace("to 1 ", "to 77 "), text.replace("\npart", "\nlaw")):
+                  text.replace("to 1 ", "to 77 "), text.replace("\npart", "\nlaw"), text.replace("\nvia ", "\nvia 9", 1),
+                  text.replace("\nvia 1 ", "\nplaced 91 1 ", 1)):
         if judged(program, file, [wrong]) != (2, 2):
             bad.append(wrong[:40])
     file.write_text(lines[0])

@@ -475,6 +475,7 @@ void Judge::part(const States& to) {
   laws(dt, mid);
   States placed;
   each("placed", [&](const auto& n, const auto&) {
+    body(n[0]);
     placed[n[0]].x = vector(n, 1), placed[n[0]].q = quaternion(n, 4);
   });
   for (const auto& [number, end] : to) {
