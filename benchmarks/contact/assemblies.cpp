@@ -35,6 +35,18 @@ Assembly stack(int n, double ratio, double mu) {
   return out;
 }
 
+void RigidAssembly::touch(int first, int second, const Eigen::Vector3d& r1,
+                          const Eigen::Vector3d& r2, const Eigen::Vector3d& normal, double mu) {
+  PointContact c;
+  c.first = first;
+  c.second = second;
+  c.r1 = r1;
+  c.r2 = r2;
+  c.normal = normal.normalized();
+  c.mu = mu;
+  contacts.push_back(c);
+}
+
 void RigidAssembly::add(const RigidAssembly& other) {
   const int b = static_cast<int>(bodies.size());
   const std::uint64_t ids = contacts.size();

@@ -25,6 +25,10 @@ Assembly stack(int n, double ratio, double mu = 0.5);
 struct RigidAssembly {
   std::vector<RigidBody> bodies;
   std::vector<PointContact> contacts;
+  Problem problem() const { return delassus(bodies, to_contacts(contacts)); }
+  // A contact without id; the normal, of any length, points to the first body.
+  void touch(int first, int second, const Eigen::Vector3d& r1, const Eigen::Vector3d& r2,
+             const Eigen::Vector3d& normal, double mu);
   // Another assembly beside this one; ids continue.
   void add(const RigidAssembly& other);
 };

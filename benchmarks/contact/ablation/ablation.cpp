@@ -20,22 +20,7 @@ using random::Generator;
 
 constexpr double kPi = 3.14159265358979;
 
-struct Assembly {
-  std::vector<RigidBody> bodies;
-  std::vector<PointContact> contacts;
-  void touch(int first, int second, const Vector3d& r1, const Vector3d& r2, const Vector3d& normal,
-             double mu) {
-    PointContact c;
-    c.first = first;
-    c.second = second;
-    c.r1 = r1;
-    c.r2 = r2;
-    c.normal = normal.normalized();
-    c.mu = mu;
-    contacts.push_back(c);
-  }
-  Problem problem() const { return delassus(bodies, to_contacts(contacts)); }
-};
+using Assembly = random::RigidAssembly;
 
 RigidBody body(Generator& g, double mass, const Vector3d& half, double speed) {
   RigidBody b = random::box(mass, half);

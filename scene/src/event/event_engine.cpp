@@ -106,6 +106,7 @@ class EventEngine : public ResumableEngine {
       driver_->observe([this](const ContactRows& rows, const VectorXd& x, const VectorXd& before,
                               bool exact) { put_impact(rows, x, before, exact); });
   }
+  ContactState touching(int contact, const Vector3d& on_first) const;
   void put_impact(const ContactRows& rows, const VectorXd& x, const VectorXd& before, bool exact);
   std::vector<std::array<Vector3d, 2>> accelerations() const;
   VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
@@ -196,22 +197,28 @@ void EventEngine::find_contact_states() const {
     }
     if (!model_->is_pair(contact)) continue;
     holders.push_back(contact);
-    const FeaturePair& pair = model_->pair(contact);
-    const Touch touch = pair.touch(model_->bodies().all());
-    ContactState c;
-    c.first = pair.first;
-    c.second = pair.second;
-    c.point = units_.length * touch.point;
-    to_world(c.point);
-    c.normal = touch.normal;
-    c.gap = units_.length * touch.gap;
-    c.force = units_.force() * model_->in_space(contact, forces[k]);
+    ContactState c = touching(contact, units_.force() * model_->in_space(contact, forces[k]));
     VectorXd slip(3);
     slip << 0, motion.slip(static_cast<int>(k));
-    c.slip = units_.speed() *
-             (pair.elliptic ? model_->slip_of(contact) : model_->in_space(contact, slip));
+    c.slip = units_.speed() * (model_->pair(contact).elliptic ? model_->slip_of(contact)
+                                                              : model_->in_space(contact, slip));
     contacts_.push_back(c);
   }
+}
+
+// Two bodies where they touch, with the force or impulse on the first one.
+ContactState EventEngine::touching(int contact, const Vector3d& on_first) const {
+  const FeaturePair& pair = model_->pair(contact);
+  const Touch touch = pair.touch(model_->bodies().all());
+  ContactState c;
+  c.first = pair.first;
+  c.second = pair.second;
+  c.point = units_.length * touch.point;
+  to_world(c.point);
+  c.normal = touch.normal;
+  c.gap = units_.length * touch.gap;
+  c.force = on_first;
+  return c;
 }
 
 // The model has the state after it.
@@ -245,17 +252,7 @@ void EventEngine::put_impact(const ContactRows& rows, const VectorXd& x, const V
     }
     if (!model_->is_pair(contact)) continue;
     holders.push_back(contact);
-    const FeaturePair& pair = model_->pair(contact);
-    const Touch touch = pair.touch(bodies.all());
-    ContactState c;
-    c.first = pair.first;
-    c.second = pair.second;
-    c.point = units_.length * touch.point;
-    to_world(c.point);
-    c.normal = touch.normal;
-    c.gap = units_.length * touch.gap;
-    c.force = impulse * on_first;
-    contacts.push_back(c);
+    contacts.push_back(touching(contact, impulse * on_first));
   }
   scribe_->put_impact(units_.time * model_->bodies().all().time, came, after, contacts, exact);
 }
