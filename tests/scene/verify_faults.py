@@ -166,6 +166,9 @@ def damaged(random_, program, file, lines):
                   text.replace("\nvia 1 ", "\nplaced 91 1 ", 1)):
         if judged(program, file, [wrong]) != (2, 2):
             bad.append(wrong[:40])
+    missing = subprocess.run([program, "verify", f"{file}.missing"], capture_output=True, text=True)
+    if missing.returncode != 2 or "no such file" not in missing.stdout + missing.stderr:
+        bad.append("a file that is not there")
     file.write_text(lines[0])
     os.truncate(file, 1 << 34)  # a line that takes all memory
     for command in ([program, "verify"], [sys.executable, verify.__file__]):

@@ -54,10 +54,11 @@ void Reader::refuse(const std::string& what) const {
 }
 
 Reader::Reader(const std::string& file) : in_(file, std::ios::binary), buffer_(kLongest + 2) {
+  if (!in_.is_open()) throw Damaged("there is no such file, or it may not be read");
   std::string head(std::string_view(kCertificateHead).size() + 2, '\0');
   in_.read(head.data(), static_cast<std::streamsize>(head.size()));
   if (!in_ || head != std::string(kCertificateHead) + "1\n")
-    refuse("no certificate of format 1, or no file");
+    refuse("it is no certificate of format 1");
 }
 
 bool Reader::next(Record& out) {
