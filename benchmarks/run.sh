@@ -1,5 +1,5 @@
 #!/bin/sh
-# What accuracy costs, side by side with every peer that the machine has: installs what is missing,
+# The price of accuracy, side by side with every peer that the machine has: installs what is missing,
 # builds in build/release, runs all comparisons and writes one folder. SPDX-License-Identifier: BSD-3-Clause
 #
 #   sh benchmarks/run.sh [--quick] [--output DIR] [--contact FOLDER] [--build DIR]

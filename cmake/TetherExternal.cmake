@@ -3,7 +3,7 @@
 #
 #   tether_find_hdf5()     tether::hdf5, for contact_io
 #   tether_find_mpi()      MPI::MPI_CXX, for contact_mpi
-# Where one is not found, there is no target. Functions, because FindHDF5 changes variables of its caller.
+# A library that is not found has no target. Functions, because FindHDF5 changes variables of its caller.
 
 function(tether_find_hdf5)
   if(NOT TARGET tether::hdf5)

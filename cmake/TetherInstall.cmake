@@ -52,7 +52,7 @@ if(TARGET tether_preload)
     DESTINATION ${CMAKE_INSTALL_DATADIR}/tether COMPONENT ${tether_dev} PATTERN check.sh EXCLUDE)
 endif()
 
-# What the config has to find and include.
+# Components that the config has to find and include.
 set(tether_needs_scene ida_projection contact)
 set(tether_has_hdf5 FALSE)
 if(TARGET tether::hdf5)

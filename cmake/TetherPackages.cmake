@@ -43,7 +43,7 @@ execute_process(COMMAND ${TETHER_GZIP} -9nf ${tether_package_dir}/tether.1 COMMA
 install(FILES ${tether_package_dir}/tether.1.gz
   DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT tether)
 
-# What compiling against the libraries needs beside them.
+# Packages that compiling against the libraries needs.
 set(tether_dev_needs "libtether (= ${PROJECT_VERSION})" libeigen3-dev)
 if(TARGET tether_ida_projection)
   list(APPEND tether_dev_needs libsundials-dev)

@@ -58,7 +58,7 @@ endfunction()
 list(FILTER OBJECTS INCLUDE REGEX "[.]o$")  # precompiled headers are listed, too
 file(RENAME ${ARCHIVE} ${ARCHIVE}.whole)  # a failure below leaves none, and is not passed over later
 
-# What one object takes from another stays visible (and hidden from outside): explicit instantiations
+# Symbols that one object takes from another stay visible (and hidden from outside): explicit instantiations
 # of templates are weak, too.
 execute_process(COMMAND ${NM} --undefined-only --format=posix ${OBJECTS}
   OUTPUT_VARIABLE shared COMMAND_ERROR_IS_FATAL ANY)

@@ -79,7 +79,7 @@ else()
   endif()
 endif()
 
-# What programs will be compiled with.
+# Settings that programs will be compiled with.
 set(TetherSundials_PRECISION "")
 set(TetherSundials_INDEX_BITS "")
 foreach(_directory IN LISTS _tether_sundials_include)

@@ -1,4 +1,4 @@
-# What every target of the project has in common: C++17, warnings, sanitizers, and for a library its
+# Common to every target of the project: C++17, warnings, sanitizers, and for a library its
 # alias and install rules. No global flags: a project that adds Tether as a subdirectory keeps its own.
 # SPDX-License-Identifier: BSD-3-Clause
 #

@@ -4,8 +4,9 @@
     python3 docs/words.py FILE_OR_FOLDER...
 
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
-phrase that the glossary replaces, no document above its length. Sources (a folder: all below it): no comment line that begins with Of, What or Where,
-no such phrase in a comment, and sections and equations of a method that its paper has; in public headers no sentence above 35 words.
+phrase that the glossary replaces, no document above its length. Sources (a folder: all below it), scripts, scenes and programs
+in documents: no comment line that begins with Of, What or Where. Sources: no such phrase in a comment, and sections and
+equations of a method that its paper has; in public headers no sentence above 35 words.
 """
 import pathlib
 import re
@@ -17,14 +18,14 @@ LENGTHS = {"README.md": 900, "benchmarks/README.md": 1500, "docs/method": 4000, 
            "ida_projection/README.md": 2500, "contact/README.md": 2500, "scene/README.md": 2500}
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 GLOSSARY = ROOT / "docs" / "glossary.md"
-SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m", ".js"}
+SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m", ".js", ".cmake", ".sh", ".toml", ".f90", ".gp"}
 BLOCK = re.compile(r"^```.*?^```[ \t]*$", re.M | re.S)
 REMARK = re.compile(r"//.*|/\*.*|(?:^|\s)#(?!\s*(?:include|define|undef|if|el|end|pragma|error|warning)).*|^\s*\*.*")
 # The paper that a comment means by "method", by the folder of its source.
 PAPERS = {"linalg": "projection", "ida_projection": "projection", "contact": "contact", "scene": "events"}
 REFERENCE = re.compile(r"\b([Mm]ethod|[Dd]etection), (section|eq)s?[. ]+(\d+(?:\.\d+)?(?:, \d+)*)")
 GUIDE = re.compile(r"(?:\b(\w+)/)?README(?:\.md)?, section (\d+)")
-COMMENT = re.compile(r"^\s*(?://+[!<]*|#)\s*(Of|What|Where)\b")
+COMMENT = re.compile(r"^\s*(?://+[!<]*|#|!)\s*(Of|What|Where)\b")
 
 
 def table_column(text, heading, column):
@@ -97,6 +98,10 @@ def check_document(path, replaced):
         for phrase, instead in replaced if path != GLOSSARY else ():
             if re.search(rf"\b{re.escape(phrase)}\b", words, re.I):
                 yield f"{path}:{line}: say \"{instead}\", not \"{phrase}\""
+    for block in BLOCK.finditer(text):
+        for number, line in enumerate(block.group().splitlines(), text.count("\n", 0, block.start()) + 1):
+            if COMMENT.match(line):
+                yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
     for problem in bad_links(path, text):
         yield f"{path}: {problem}"
 
@@ -167,7 +172,7 @@ def main(names):
         for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
             if file.suffix == ".md":
                 problems += check_document(file, replaced)
-            elif file.suffix in SOURCES and file.is_file():
+            elif (file.suffix in SOURCES or file.name == "CMakeLists.txt") and file.is_file():
                 problems += check_source(file, replaced)
             else:
                 continue

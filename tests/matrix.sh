@@ -90,7 +90,7 @@ row_threads() {
   if sh tests/sanitize.sh threads; then note threads ran; else note threads FAILED; failed=1; fi
 }
 
-# What runs where there is no AVX2, on any machine.
+# The code for processors without AVX2, on any machine.
 row_scalar() {
   build_and_test scalar 'contact:|stepping|scene' -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS=-DTETHER_GROUPS=0
 }

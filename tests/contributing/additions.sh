@@ -1,5 +1,5 @@
 #!/bin/sh
-# What a new thing touches, as CONTRIBUTING.md says: one of each kind is added to a copy of the sources, compiled, and its
+# Counts the files that a new thing touches, as CONTRIBUTING.md says: one of each kind is added to a copy of the sources, compiled, and its
 # files are counted. sh additions.sh <sources> <scratch folder> <compiler> <its arguments, a file> <cmake>
 # SPDX-License-Identifier: BSD-3-Clause
 set -eu

@@ -148,7 +148,7 @@ headers_and_eigen() {
     }')
 }
 
-# What a header reaches of Eigen is compiled once before it: half a second in place of two.
+# The headers of Eigen that a header reaches are compiled once before it, which saves most of the time.
 # shellcheck disable=SC2046,SC2086
 headers() {
   flags="-std=c++17 -O0 -w $(pc "$this" --cflags $(for l in $libraries; do package_of "$l"; done))"
@@ -179,7 +179,7 @@ headers() {
   done
 }
 
-# What the libraries show of Eigen: nothing. Of an archive not even inline functions of others.
+# The libraries show no symbols of Eigen. Of an archive not even inline functions of others.
 symbols() {
   for component in $libraries; do
     quiet "$nm" --extern-only --defined-only --format=posix "$work/static/$libdir/libtether_$component.a"

@@ -74,7 +74,7 @@ refused b.new import robot --out b
 printf '[output]\ncsv = "m.obj"\n' >>mesh.toml
 refused m.obj run mesh.toml --quiet
 
-# What waits for a reader, or is a second name, where a file is made on the way: neither opened nor written into.
+# A pipe, or a second name of a file, where a file is made on the way: neither opened nor written into.
 for name in x.svg x.state f.pvd; do
   option=${name#*.}
   [ $option = pvd ] && option=vtk

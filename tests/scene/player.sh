@@ -29,7 +29,7 @@ for scene in "$@"; do
   if ! grep -q 'id="message" hidden' "$work/dom"; then echo "$scene: a message"; wrong=1; fi
   if grep -q '<img' "$work/dom"; then echo "$scene: a name became an element"; wrong=1; fi
 done
-# What accuracy costs: points, and the command of each.
+# The price of accuracy: points, and the command of each.
 "$program" cost "$2" --tolerances 1e-3:1e-6 --reference 1e-8 --wanted 1e-2 --html "$work/cost.html" >"$work/said" 2>&1 ||
   [ $? -eq 1 ] || { cat "$work/said"; wrong=1; }
 page "$work/cost.html"

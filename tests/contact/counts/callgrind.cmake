@@ -1,4 +1,4 @@
-# What scripts that count instructions share. SPDX-License-Identifier: BSD-3-Clause
+# Functions of all scripts that count instructions. SPDX-License-Identifier: BSD-3-Clause
 
 # need_valgrind(): without it the script ends, and CTest counts it as skipped.
 macro(need_valgrind)

@@ -3,7 +3,7 @@ cmake_minimum_required(VERSION 3.23)
 include(${CMAKE_CURRENT_LIST_DIR}/callgrind.cmake)
 need_valgrind()
 
-# What is in the programs.
+# Functions in the programs.
 function(symbols program result)
   execute_process(COMMAND ${NM} -C ${program} OUTPUT_VARIABLE all COMMAND_ERROR_IS_FATAL ANY)
   set(${result} "${all}" PARENT_SCOPE)
@@ -30,7 +30,7 @@ foreach(needed IN ITEMS sweep_smooth "Stepper::step" "NearContacts::find")
   endif()
 endforeach()
 
-# What a step costs.
+# The price of a step.
 set(step "tether::contact::Stepper::step()")
 count(COMMAND ${MINIMUM} settle TOGGLE ${step} TOTAL least OUTPUT least_said FUNCTIONS ran)
 count(COMMAND ${EVERYTHING} settle TOGGLE ${step} TOTAL most OUTPUT most_said)

@@ -69,7 +69,7 @@ function(ran name scene result)
   set(${result} "${functions}" PARENT_SCOPE)
 endfunction()
 
-# What moves bodies or laws; an effect that a scene does not name is not made, and its law not asked.
+# Functions that move bodies or laws: an effect that a scene does not name is not made, and its law not asked.
 set(words CentralGravityForce:: DragForce:: LoadForce:: SpringForces:: JointFrictionEffect::add_laws
   JointLimitEffect::add_laws JointMotorEffect::add_laws LawRows::start detail::Restitution:: RollingPart::)
 
