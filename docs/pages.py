@@ -20,7 +20,7 @@ PARTS = (
     ("Start", ["README.md", "docs/README.md"]),
     ("Tutorials", ["docs/drop_in.md", "docs/contact.md", "docs/scene.md", "docs/tolerance.md"]),
     ("Guides", ["ida_projection/README.md", "contact/README.md", "scene/README.md", "docs/scene_fields.md",
-                "python/README.md", "linalg/README.md", "examples/README.md", "examples/drop_in/README.md"]),
+                "docs/certificate.md", "python/README.md", "linalg/README.md", "examples/README.md", "examples/drop_in/README.md"]),
     ("Methods", ["docs/method/projection.md", "docs/method/contact.md", "docs/method/detection.md",
                  "docs/method/events.md", "docs/glossary.md"]),
     ("Results", ["benchmarks/results/index.md", "benchmarks/README.md"] +
