@@ -4,8 +4,8 @@
     python3 docs/words.py FILE_OR_FOLDER...
 
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
-phrase that the glossary replaces, no document above its length. Sources (a folder: all below it), scripts, scenes and programs
-in documents: no comment line that begins with Of, What or Where. Sources: no such phrase in a comment, and sections and
+section or equation of a method that its paper lacks, no phrase that the glossary replaces, no
+document above its length. Sources (a folder: all below it), scripts, scenes and programs in documents: no comment line that begins with Of, What or Where. Sources: no such phrase in a comment, and sections and
 equations of a method that its paper has; in public headers no sentence above 35 words.
 """
 import pathlib
@@ -102,7 +102,7 @@ def check_document(path, replaced):
         for number, line in enumerate(block.group().splitlines(), text.count("\n", 0, block.start()) + 1):
             if COMMENT.match(line):
                 yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
-    for problem in bad_links(path, text):
+    for problem in [*bad_links(path, text), *bad_citations(path, text)]:
         yield f"{path}: {problem}"
 
 
@@ -112,6 +112,17 @@ def paper(name, known={}):
         text = (ROOT / "docs" / "method" / f"{name}.md").read_text()
         known[name] = {"section": set(re.findall(r"^##+ (\d+(?:\.\d+)?)", text, re.M)), "eq": set(re.findall(r"\\tag\{(\d+)\}", text))}
     return known[name]
+
+
+def bad_citations(path, text):
+    """Sections and equations that a document cites, of a paper that it links to or of itself."""
+    words = BLOCK.sub("", text)
+    cited = re.findall(r"\]\([\w./]*?(\w+)\.md[^)]*\), (eq|section)(?:uation)? \(?(\d+(?:\.\d+)?)", words)
+    if path.parent.name == "method":
+        cited += [(path.stem, "eq", number) for number in re.findall(r"(?<!equation )\((\d\d?)\)", re.sub(r"\$[^$]*\$", "", words))]
+    for name, kind, number in cited:
+        if (ROOT / "docs" / "method" / f"{name}.md").is_file() and number not in paper(name)[kind]:
+            yield f"docs/method/{name}.md has no {kind} {number}"
 
 
 def docstrings(text):
