@@ -7,732 +7,478 @@ The lines of a certificate are explained in docs/certificate.md.
 Exit code: 0 every law holds, 1 one is broken, 2 a file cannot be judged."""
 import collections
 import math
+import operator
 import sys
 
-BALANCE = 1e-6  # of the impulses or forces on a body
-LAW = 1e-6  # of the speeds at contacts
-EQUATIONS = 1e-5  # of the forces at an instant
-TIMES = 1e-15  # of times: their rounding
-USEFUL = 1e-2  # residual of a problem whose solution a step may use
-HOLDS = 1e-6  # of the arms of a joint, m; speeds the same
-
+# How much a law may be off, as a part of the times, places, speeds, impulses or forces that it is about.
+LAWS = {"contact problems solved": 0, "residual of contact problems": 1e-2, "residual as claimed": 1e-4, "fixed bodies rest": 0,
+        "unit length": 1e-9, "time goes on": 1e-9, "motion goes on": 1e-6, "weight": 1e-9, "weight acts": 0,
+        "balance of momentum": 1e-6, "balance of angular momentum": 1e-6, "places move as velocities": 1e-6,
+        "orientation moves as velocities": 1e-6, "corrections close gaps": 10, "extrapolation": 1e-6,
+        "joints hold": 1e-6, "joints' velocities": 1e-6, "joints' accelerations": 1e-4, "reaction": 1e-9,
+        "moment of reaction": 1e-6, "reaction of the joint's kind": 1e-6, "limit, motor, friction or spring": 1e-4,
+        "points of contact": 1 + 1e-6, "contact closed": 1e-4, "contact pushes within its cone": 1e-6, "law of contact": 1e-6,
+        "law of contact at an instant": 1e-4, "moments of friction": 1e-6, "restitution, or gap that closes": 1, "surface speed": 1,
+        "equations of motion": 1e-5, "equations of rotation": 1e-5, "places follow velocities": 1e-5, "momentum leads on": 1e-5,
+        "angular momentum leads on": 1e-5, "places lead on": 1e-5, "orientation leads on": 1e-5}
 # Numbers of a line; "+": or more; "t": then a text.
-LINES = {"body": "9t", "surface": "10", "pair": "7", "gravity": "3", "engine": "0t", "joint": "23t", "coupled": "2+", "step": "5",
-         "part": "4", "trial": "4", "extrapolated": "1", "start": "1", "instant": "2", "arrives": "1", "strike": "1", "push": "7t", "contact": "22",
-         "pull": "14", "law": "10+", "via": "7", "placed": "8", "to": "14", "rate": "7", "end": "1"}
-
-LONGEST = 1 << 16  # of a line
+HEADS = {"body": "9t", "surface": "10", "pair": "7", "gravity": "3", "engine": "0t", "joint": "23t", "coupled": "2+", "step": "5", "end": "1"}
+BLOCKS = {"part": "4", "trial": "4", "extrapolated": "1", "start": "1", "instant": "2", "arrives": "1"}
+INSIDE = {"push": "7t", "contact": "22", "pull": "14", "law": "10+", "via": "7", "placed": "8", "rate": "7"}
+LINES = {**HEADS, **BLOCKS, **INSIDE, "to": "14"}
+LONGEST, ROUNDING, TIMES = 1 << 16, 1e-9, 1e-15  # of a line; of places and speeds; of the difference of two times
 
 
 class Damaged(Exception):
     pass
 
 
-def add(a, b, factor=1.0):
-    return [x + factor * y for x, y in zip(a, b)]
+class V(tuple):
+    """A vector, or a quaternion w x y z."""
+    __add__ = lambda a, b: V(map(operator.add, a, b))
+    __sub__ = lambda a, b: V(map(operator.sub, a, b))
+    __mul__ = lambda a, factor: V([x * factor for x in a])
+    __matmul__ = lambda a, b: sum(map(operator.mul, a, b))
+    __xor__ = lambda a, b: V((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
+    __abs__ = lambda a: math.hypot(*a)
+    tail = property(lambda a: V(a[1:]))
+    unit = property(lambda a: a * (1 / (abs(a) or 1)))
+    back = property(lambda q: V((q[0], -q[1], -q[2], -q[3])))
+    beside = lambda a, n: a - n * (a @ n)  # n: unit
+    then = lambda q, p: V((p[0] * q[0] - p.tail @ q.tail, *q.tail * p[0] + p.tail * q[0] + (p.tail ^ q.tail)))  # turns by q, then by p
+    turn = lambda q, v: v + (q.tail ^ v) * (2 * q[0]) + (q.tail ^ (q.tail ^ v)) * 2
+    apart = lambda p, q: 2 * min(abs(p - q), abs(p + q))
+    across = lambda n: min(X, Y, Z, key=lambda e: abs(e @ n)).beside(n).unit
 
 
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b))
-
-
-def norm(a):
-    return math.sqrt(dot(a, a))
-
-
-def scaled(a, factor):
-    return [factor * x for x in a]
-
-
-def cross(a, b):
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def times(p, q):
-    return [p[0] * q[0] - dot(p[1:], q[1:]), *add(add(scaled(q[1:], p[0]), p[1:], q[0]), cross(p[1:], q[1:]))]
-
-
-def back(q):
-    return [q[0], -q[1], -q[2], -q[3]]
-
-
-def turn(q, v):
-    c = cross(q[1:], v)
-    return add(v, add(scaled(c, q[0]), cross(q[1:], c)), 2)
+X, Y, Z, NONE = V((1, 0, 0)), V((0, 1, 0)), V((0, 0, 1)), V((0, 0, 0))
+State = collections.namedtuple("State", "x q v w")
+STILL = State(NONE, V((1, 0, 0, 0)), NONE, NONE)
 
 
 def rotation(v):
-    """Quaternion of a rotation vector."""
-    a = norm(v)
-    return [math.cos(a / 2), *scaled(v, math.sin(a / 2) / a if a > 0 else 0.5)]
-
-
-def apart(p, q):
-    return 2 * min(norm(add(p, q, -1)), norm(add(p, q)))
-
-
-def across(n):
-    e = [0.0, 0.0, 0.0]
-    e[min(range(3), key=lambda k: abs(n[k]))] = 1.0
-    t = add(e, n, -dot(e, n))
-    return scaled(t, 1 / norm(t))
-
-
-def solve3(m, b):
-    """m x = b, by Cramer's rule."""
-    det = dot(m[0], cross(m[1], m[2]))
-    columns = list(zip(*m))
-    return [dot(b, cross(columns[(k + 1) % 3], columns[(k + 2) % 3])) / det for k in range(3)]
-
-
-class Body:
-    def __init__(self, n, name):
-        self.mass, self.material, self.name = n[1], n[8], name
-        self.inertia = [[n[2], n[7], n[6]], [n[7], n[3], n[5]], [n[6], n[5], n[4]]]
-        self.round = all(abs(self.inertia[i][j] - (n[2] if i == j else 0)) <= 1e-13 * n[2] for i in range(3) for j in range(3))
-        self.state, self.time = None, None  # x 3, q 4, v 3, w 3
-        self.belt, self.axis = [0.0] * 6, [0.0] * 3
-
-    def spin(self, q, w):
-        """Angular momentum, world axes."""
-        u = turn(back(q), w)
-        return turn(q, [dot(row, u) for row in self.inertia])
-
-    def unspin(self, q, momentum):
-        return turn(q, solve3(self.inertia, turn(back(q), momentum)))
+    a = min(abs(v), 1e300)
+    return V((math.cos(a / 2), *v * (math.sin(a / 2) / a if a > 0 else 0.5)))
 
 
 def natural_residual(friction, n, y, w):
-    """How far an impulse over the mass, y, and a velocity w are off Coulomb's law together, m/s."""
+    """|x - P(x - v)|, P the projection onto the cone: how far an impulse over the mass, y, and a velocity w are off Coulomb's law, m/s."""
     along, sideways, axis, associated = friction
-    t = add(axis, n, -dot(axis, n))
-    t = scaled(t, 1 / norm(t)) if norm(t) > 0 else across(n)
-    b = cross(n, t)
-    v = [dot(n, w), along * dot(t, w), sideways * dot(b, w)]
-    x = [dot(n, y), dot(t, y) / along if along > 0 else 0.0, dot(b, y) / sideways if sideways > 0 else 0.0]
-    if not associated:
-        v[0] += norm(v[1:])
-    z = add(x, v, -1)
-    size = norm(z[1:])
-    p = z
-    if size > z[0]:
-        onto = max(0.0, (z[0] + size) / 2)
-        p = [onto, *scaled(z[1:], onto / size if size > 0 else 0.0)]
-    off = norm(add(y, n, -dot(y, n))) if along == sideways == 0 else 0.0
-    return max(norm(add(x, p, -1)), off)
-
-
-class Joint:
-    # Directions of the second body's frame in which points, and turns, are held.
-    HELD = {"ball": ("xyz", ""), "hinge": ("xyz", "xy"), "slider": ("xy", "xyz"), "fixed": ("xyz", "xyz"), "planar": ("z", "xy"),
-            "universal": ("xyz", "u"), "distance": ("d", "")}
-
-    def __init__(self, n, text):
-        self.kind, self.name = (text.split(" ", 1) + [""])[:2]
-        if self.kind not in self.HELD:
-            raise Damaged(f"joint of a kind {self.kind!r}")
-        self.bodies, self.p1, self.f1, self.p2, self.f2 = (int(n[1]), int(n[2])), n[3:6], n[6:10], n[10:13], n[13:17]
-        self.length, self.driven, self.has_laws, self.motion = n[17], n[18] == 1, n[18] == 2, n[19:23]
-        self.held, self.turns = self.HELD[self.kind]
-
-    def way(self, t):
-        rate, amplitude, frequency, phase = self.motion
-        w = 2 * math.pi * frequency
-        return (rate * t + amplitude * (math.sin(w * t + phase) - math.sin(phase)), rate + amplitude * w * math.cos(w * t + phase),
-                -amplitude * w * w * math.sin(w * t + phase))
-
-    def places(self, states):
-        """Frames and points on both bodies, and arms."""
-        a, b = states
-        r1, r2 = turn(a[3:7], self.p1), turn(b[3:7], self.p2)
-        return times(a[3:7], self.f1), times(b[3:7], self.f2), add(a[:3], r1), add(b[:3], r2), r1, r2
-
-    def directions(self, states):
-        """Held directions of points and of turns, and the free one that laws act along."""
-        g1, g2, x1, x2, _, _ = self.places(states)
-        axes = {k: turn(g2, e) for k, e in zip("xyz", ([1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]))}
-        axes["d"] = scaled(add(x1, x2, -1), 1 / (norm(add(x1, x2, -1)) or 1))
-        axes["u"] = cross(turn(g1, [0, 0, 1.0]), axes["x"])
-        return [axes[k] for k in self.held], [axes[k] for k in self.turns], axes["z"]
-
-    def errors(self, states, t):
-        """Largest error of places, m or rad, and of speeds."""
-        g1, g2, x1, x2, r1, r2 = self.places(states)
-        s, rate, _ = self.way(t) if self.driven else (0, 0, 0)
-        d, off, fast = add(x1, x2, -1), [], []
-        a, b = states
-        u = add(add(a[7:10], cross(a[10:13], r1)), add(b[7:10], cross(b[10:13], r2)), -1)
-        w = add(a[10:13], b[10:13], -1)
-        u = add(u, cross(b[10:13], d), -1)
-        held, turns, z = self.directions(states)
-        if self.kind == "distance":
-            off, fast = [norm(d) - self.length - s], [dot(held[0], u) - rate]
-        else:
-            off += [dot(k, d) for k in held]
-            fast += [dot(k, u) for k in held] + [dot(k, w) for k in turns]
-            if self.kind == "universal":
-                off.append(dot(turn(g1, [0, 0, 1.0]), turn(g2, [1.0, 0, 0])))
-            elif self.kind != "ball":
-                q = times(back(g2), g1)
-                if self.kind == "hinge" and self.driven:
-                    q = times(rotation([0, 0, -s]), q)
-                    fast.append(dot(z, w) - rate)
-                    off.append(2 * q[3] * (1 if q[0] > 0 else -1))
-                off += [2 * q[1 + "xyz".index(k)] for k in self.turns]
-                if self.kind in ("hinge", "planar"):
-                    off[-2:] = turn(q, [0, 0, 1.0])[:2]
-            if self.kind == "slider" and self.driven:
-                off.append(dot(z, d) - s)
-                fast.append(dot(z, u) - rate)
-        return max(map(abs, off)), max(map(abs, fast))
+    t = axis.beside(n).unit if abs(axis.beside(n)) > 0 else n.across()
+    b = n ^ t
+    v, x = V((n @ w, along * (t @ w), sideways * (b @ w))), V((n @ y, t @ y / (along or math.inf), b @ y / (sideways or math.inf)))
+    z = x - v - X * (0 if associated else abs(v.tail))
+    size = abs(z.tail)
+    onto = max(0.0, (z[0] + size) / 2)
+    p = V((onto, *z.tail * (onto / (size or 1)))) if size > z[0] else z
+    return max(abs(x - p), 0 if along or sideways else abs(y.beside(n)))
 
 
 def read(file):
     """Words, numbers and texts of its lines; Damaged where it is none, or not whole."""
-    count, word = 0, None
+    number, word = 0, ""
     with open(file, encoding="utf-8", errors="replace") as lines:
-        for line in iter(lambda: lines.readline(LONGEST), ""):
-            if not line.endswith("\n"):
-                raise Damaged(f"line {count + 1} is cut, or longer than any")
-            if count == 0 and line != "tether certificate 1\n":
-                raise Damaged("it is no certificate of this format")
-            if word == "end":
-                raise Damaged("it goes on behind its end")
-            count += 1
-            if count == 1:
+        for number, line in enumerate(iter(lambda: lines.readline(LONGEST), ""), 1):
+            last, (word, _, rest) = word, line[:-1].partition(" ")
+            if not line.endswith("\n") or last == "end":
+                raise Damaged(f"line {number} is cut, longer than any, or behind the end")
+            if number == 1 and line == "tether certificate 1\n":
                 continue
-            word, _, rest = line[:-1].partition(" ")
-            form = LINES.get(word)
-            if form is None:
-                raise Damaged(f"line {count}: {word[:20]!r} is no word of a certificate")
-            least, fields = int(form.strip("+t")), rest.split(" ")
-            text = " ".join(fields[least:]) if "t" in form else ""
-            fields = fields[:least] if "t" in form else fields
-            try:
-                numbers = [float(each) for each in fields if each] if fields != [""] else []
-            except ValueError:
-                raise Damaged(f"line {count}: not a number") from None
-            if len(numbers) < least or len(numbers) > least and form[-1] != "+" or not all(map(math.isfinite, [
-                    x for k, x in enumerate(numbers) if word != "law" or k != 5])):
-                raise Damaged(f"line {count}: {word} has {form.strip('+t')} finite numbers")
-            if word == "end" and numbers[0] != count - 1:
-                raise Damaged(f"{count - 1} lines of {numbers[0]:g}: a part is missing")
-            yield word, numbers, text
+            if number == 1 or word not in LINES:
+                raise Damaged(f"line {number}: {word[:20]!r} is no word of a certificate of this format")
+            least, has_text = int(LINES[word].rstrip("+t")), "t" in LINES[word]
+            n = rest.split(" ", least if has_text else -1)
+            text = n.pop() if has_text and len(n) > least else ""
+            n = [float(each) for each in n]
+            finite = all(math.isfinite(x) or k == 5 and x == math.inf and word == "law" for k, x in enumerate(n))
+            if not finite or len(n) < least or len(n) > least and "+" not in LINES[word] or word == "end" and n != [number - 1]:
+                raise Damaged(f"line {number}: {word} has {LINES[word].rstrip('+t')} finite numbers; that of the end is of the lines before")
+            yield number, word, n, text
     if word != "end":
         raise Damaged("its end is missing: it was cut")
 
 
+class Body:
+    def __init__(self, n, name):
+        self.mass, self.material, self.name, self.trace = n[1], n[8], name, sum(n[2:5])
+        self.rows = a, b, c = V((n[2], n[7], n[6])), V((n[7], n[3], n[5])), V((n[6], n[5], n[4]))  # of the inertia
+        self.round = max(abs(row - e * n[2]) for row, e in zip(self.rows, (X, Y, Z))) <= 1e-13 * n[2]
+        self.inverse = [e * (1 / (a @ (b ^ c))) for e in (b ^ c, c ^ a, a ^ b)] if self.mass else None
+        self.state, self.time, self.surface = None, 0.0, (NONE, NONE, NONE)
+        if self.mass < 0:
+            raise Damaged(f"the mass of {name} is negative")
+
+    def spin(self, q, w, rows=None):
+        """Angular momentum, world axes; of it, with the inverse rows, the angular velocity."""
+        u = q.back.turn(w)
+        return q.turn(V([row @ u for row in rows or self.rows]))
+
+    def struck(self, loads):
+        s = self.state
+        return State(s.x, s.q, s.v + total(loads)[0] * (1 / self.mass), s.w + self.spin(s.q, total(loads)[1], self.inverse))
+
+
+def total(loads):
+    """Impulse and moment about the centre, or force and torque, and the sums of their sizes."""
+    return sum((f for f, _ in loads), NONE), sum((m for _, m in loads), NONE), sum(abs(f) for f, _ in loads), sum(abs(m) for _, m in loads)
+
+
+class Joint:
+    # Directions of the second body's frame in which points, and turns, are held. d: from point to point; u: across both axes.
+    HELD = {"ball": ("xyz", ""), "hinge": ("xyz", "xy"), "slider": ("xy", "xyz"), "fixed": ("xyz", "xyz"), "planar": ("z", "xy"),
+            "universal": ("xyz", "u"), "distance": ("d", "")}
+
+    def __init__(self, n, text):
+        self.kind, _, self.name = text.partition(" ")
+        self.bodies, self.points, self.frames = n[1:3], (V(n[3:6]), V(n[10:13])), (V(n[6:10]), V(n[13:17]))
+        self.length, self.driven, self.has_laws, self.motion, self.arms = n[17], n[18] == 1, n[18] == 2, n[19:23], sum(map(abs, self.points))
+        held, turns = self.HELD[self.kind]
+        self.held, self.turns = held + "z" * (self.driven and self.kind == "slider"), turns + "z" * (self.driven and self.kind == "hinge")
+
+    def place(self, states):
+        """The point on the first body, its way from that on the second, the turn, the directions held of points and of turns, the axis."""
+        (a, b), (one, two) = states, (f.then(s.q) for s, f in zip(states, self.frames))
+        p = a.x + a.q.turn(self.points[0])
+        d = p - b.x - b.q.turn(self.points[1])
+        axes = {"x": two.turn(X), "y": two.turn(Y), "z": two.turn(Z), "d": d.unit, "u": one.turn(Z) ^ two.turn(X)}
+        return p, d, one.then(two.back), [axes[k] for k in self.held], [axes[k] for k in self.turns], axes["z"]
+
+    def errors(self, states, t):
+        """How far places (m, rad) are off, and speeds of points and of turns."""
+        (a, b), (p, d, q, held, turns, _) = states, self.place(states)
+        u = a.v + (a.w ^ (p - a.x)) - b.v - (b.w ^ (p - b.x))
+        off, slips, spins = [k @ d for k in held], [k @ u for k in held], [k @ (a.w - b.w) for k in turns]
+        if self.kind == "distance":
+            off[0] -= self.length
+        if self.driven:
+            (rate, amplitude, frequency, phase), w = self.motion, 2 * math.pi * self.motion[2]
+            s, fast = rate * t + amplitude * (math.sin(w * t + phase) - math.sin(phase)), rate + amplitude * w * math.cos(w * t + phase)
+            if self.kind == "hinge":
+                q, spins[-1] = q.then(rotation(Z * -s)), spins[-1] - fast
+            else:
+                off[-1], slips[-1] = off[-1] - s, slips[-1] - fast
+        tilt = q.turn(Z)
+        return off + {"": [], "u": [tilt[0]], "xy": list(tilt[:2]), "xyz": list(q.tail * 2)}[self.turns], slips, spins
+
+    def accelerations(self, states, rates, t):
+        """How fast the errors of speeds grow, of points and of turns: by differences over a short time."""
+        h = 1e-3 / (1 + max(abs(s.w) for s in states) + 2 * math.pi * abs(self.motion[2]))
+        ahead, behind = (self.errors([State(s.x + s.v * k, s.q.then(rotation(s.w * k)), s.v + a * k, s.w + alpha * k)
+                                      for s, (a, alpha) in zip(states, rates)], t + k)[1:] for k in (h, -h))
+        return [[(x - y) / (2 * h) for x, y in zip(*each)] for each in zip(ahead, behind)]
+
+
 class Judge:
     def __init__(self):
-        self.bodies, self.pairs, self.joints, self.coupled, self.gravity = {}, {}, {}, [], [0.0] * 3
-        self.faults, self.judged, self.step, self.when = [], collections.Counter(), 0, 0.0
-        self.keeps_momentum, self.associated, self.frictionless, self.claimed = True, False, False, 0.0
-        self.block, self.lines, self.trial, self.past = None, [], None, []
+        self.bodies, self.pairs, self.joints, self.reacts, self.gravity = {-1: Body([-1, 0, 0, 0, 0, 0, 0, 0, -1], "the world")}, {}, {}, {}, NONE
+        self.bodies[-1].state = STILL
+        self.faults, self.judged, self.step, self.when, self.line, self.claimed = [], collections.Counter(), 0, 0.0, 0, 0.0
+        self.until, self.block, self.before, self.trial, self.moved = None, None, None, None, False
+        self.told, self.past = collections.defaultdict(list), collections.deque(maxlen=4)
 
     def run(self, file):
-        for word, n, text in read(file):
-            if word in ("push", "contact", "pull", "law", "via", "placed", "rate"):
-                if self.block is None:
-                    raise Damaged(f"{word} is of no part")
-                self.lines.append((word, n, text))
-            elif word == "to":
-                self.index(n[0])
-                self.lines.append((word, n, text))
+        for line, word, n, text in read(file):
+            if word not in HEADS and word not in BLOCKS:
+                if word != "to" and not self.block or word not in ("pull", "law") and n[0] not in self.bodies:
+                    raise Damaged(f"line {line}: {word} is of no part or of no body")
+                self.told[word].append((n, text))
+                continue
+            self.finish()
+            self.line = line
+            if word in BLOCKS:
+                self.block, self.when = (word, n), n[0]
             else:
-                self.finish()
                 self.head(word, n, text)
         if not self.moved:
             raise Damaged("nothing moves in it")
         return self
 
-    def index(self, number):
-        if number not in self.bodies:
-            raise Damaged(f"body {number:g} is not told")
-        return self.bodies[number]
+    def expect(self, law, off, size=1.0, what="step", slack=0.0):
+        bound = LAWS[law] * size + slack
+        self.judged[law] += 1
+        if not off <= bound < math.inf:
+            self.faults.append(f"step {self.step:g}, t = {self.when:g} s: {what}: {law}: {off:.3g}, at most {bound:.3g}")
 
     def head(self, word, n, text):
         if word == "body":
-            self.bodies[n[0]] = Body(n, text)
+            if self.bodies.setdefault(n[0], Body(n, text)).mass != n[1]:
+                raise Damaged(f"body {n[0]:g} is told twice")
         elif word == "surface":
-            self.index(n[0]).belt, self.bodies[n[0]].axis = n[1:7], n[7:10]
+            self.bodies[n[0]].surface = V(n[1:4]), V(n[4:7]), V(n[7:10])
         elif word == "pair":
             self.pairs[n[0], n[1]] = n[2:]
         elif word == "gravity":
-            self.gravity = n
+            self.gravity = V(n)
         elif word == "engine":
-            self.past = []
-            words = (text + "  ").split(" ")
-            self.joints, self.coupled = {}, []
-            self.keeps_momentum, self.associated = words[1] == "momentum", words[2] == "maximum_dissipation"
-            self.frictionless = words[2] == "frictionless"
+            self.rules, self.joints, self.reacts = (text + "  ").split(" ")[1:3], {}, {}
+            self.past.clear()
         elif word == "joint":
-            self.joints[n[0]] = Joint(n, text)
+            self.joints[n[0]] = self.reacts[n[0]] = Joint(n, text)
         elif word == "coupled":
-            if n[1] not in self.joints:
-                raise Damaged(f"a coupling of joint {n[1]:g}, which is not told")
-            self.coupled.append((n[0], n[1], n[2:]))
-        elif word == "step":
-            self.end_of_step(n[1])
-            self.step, self.claimed = n[0], n[3]
-            self.expect("contact problems solved", abs(n[4] - 1), 0, "step")
-            self.expect("residual of contact problems", abs(n[3]), USEFUL, "step")
-            self.until = n[2]
-        elif word == "end":
-            self.end_of_step(None)
-        elif word in ("part", "trial", "instant", "arrives", "extrapolated", "start"):
-            self.block, self.when = (word, n), n[0]
-
-    until, moved = None, False
-
-    def end_of_step(self, start):
-        """All bodies have reached the end of the step before, where the next one begins."""
-        if self.until is None:
-            return
-        for body in self.bodies.values():
-            if body.mass > 0:
-                self.expect("time goes on", abs(body.time - self.until), 1e-9 * (1 + abs(self.until)), body.name)
-        if start is not None:
-            self.expect("time goes on", abs(start - self.until), 1e-9 * (1 + abs(self.until)), "step")
-
-    def expect(self, law, amount, bound, what):
-        self.judged[law] += 1
-        if not (amount <= bound < math.inf):
-            self.faults.append(f"step {self.step:g}, t = {self.when:g} s: {what}: {law}: {amount:.3g}, at most {bound:.3g}")
+            self.reacts[len(self.reacts)] = self.joints[n[1]]
+            self.joints[n[1]].has_laws = True
+        if word in ("step", "end") and self.until is not None:  # all bodies have reached the end of the step, where the next one begins
+            starts = [b.time for b in self.bodies.values() if b.mass > 0] + n[1:2]
+            self.expect("time goes on", max(abs(t - self.until) for t in starts), 1 + abs(self.until))
+        if word == "step":
+            self.step, self.until, self.claimed = n[0], n[2], n[3]
+            self.expect("contact problems solved", abs(n[4] - 1))
+            self.expect("residual of contact problems", abs(n[3]))
 
     def finish(self):
-        """Judges the block that has been read."""
-        if self.block is None:
-            for _, n, _ in self.lines:
-                self.bodies[n[0]].state, name = n[1:], self.bodies[n[0]].name
-                self.expect("unit orientation", abs(norm(n[4:8]) - 1), 1e-9, name)
-                self.expect("fixed bodies rest", norm(n[8:11]) + norm(n[11:14]), 0, name)
-        else:
-            (word, n), bodies = self.block, self.bodies
-            to = {line[0]: line[1:] for kind, line, _ in self.lines if kind == "to"}
-            if word == "trial" and self.trial is None:
-                self.trial = {k: (b.state, b.time) for k, b in bodies.items()}
-            if word == "part" and isinstance(self.trial, dict):
-                ends = {k: b.state for k, b in bodies.items()}
-                for k, b in bodies.items():
-                    b.state, b.time = self.trial[k]
-                self.trial = [ends]
-            if word in ("part", "trial"):
-                self.part(n, to)
-            elif word == "extrapolated":
-                self.extrapolated(to)
-            if word in ("instant", "arrives"):
-                self.follows(n[0], to)
-            if word == "instant":
-                self.instant(n, to)
-            elif word == "start" and any(bodies[k].state for k in to):
-                self.judged["motion goes on"] += 1
-                self.expect("motion goes on", max(norm(add(bodies[k].state, s, -1)) for k, s in to.items()), 1e-6, "all bodies")
-            self.moved = self.moved or bool(to)
-            for k, state in to.items():
-                bodies[k].state, bodies[k].time = state, n[0] + (n[1] if word in ("part", "trial") else 0)
-                self.expect("unit orientation", abs(norm(state[3:7]) - 1), 1e-9, bodies[k].name)
-            if to:
-                self.hold(to)
-        self.block, self.lines = None, []
-
-    def hold(self, moved):
-        """Joints of these bodies hold."""
-        for joint in self.joints.values():
-            if not moved.keys() & set(joint.bodies):
-                continue
-            states = [self.state(k) for k in joint.bodies]
-            if not all(states):
-                raise Damaged(f"joint {joint.name}: a body has no state")
-            arm = 1 + norm(joint.p1) + norm(joint.p2) + max(norm(s[:3]) for s in states)
-            fast = 1 + max(norm(s[7:10]) + norm(s[10:13]) * arm for s in states)
-            off, slip = joint.errors(states, max(self.bodies[k].time or 0 for k in joint.bodies if k >= 0))
-            self.expect("joints hold", off, HOLDS * arm, joint.name)
-            self.expect("joints' velocities", slip, HOLDS * fast * arm, joint.name)
-
-    def state(self, k):
-        return self.bodies[k].state if k >= 0 else [0.0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]
-
-    def part(self, n, to):
-        start, dt, composed, claimed = n
-        bodies = self.bodies
-        for k in to:
-            if bodies[k].state is None:
-                raise Damaged(f"body {bodies[k].name} has no state at {start:g} s")
-            self.expect("time goes on", abs(bodies[k].time - start), 1e-9 * (1 + abs(start)), bodies[k].name)
-        loads = {k: [[0.0] * 3, [0.0] * 3, 0.0, 0.0] for k in to}  # P, L about the centre, scales
-        late = {k: [[0.0] * 3, [0.0] * 3] for k in to}
-
-        def load(k, force, torque, on=loads):
-            if k in on:
-                on[k][0], on[k][1] = add(on[k][0], force), add(on[k][1], torque)
-                loads[k][2] += norm(force)
-                loads[k][3] += norm(torque)
-
-        pushed = collections.Counter()
-        for kind, m, text in self.lines:
-            if kind == "push":
-                load(m[0], m[1:4], m[4:7])
-                if text == "gravity":
-                    pushed[m[0]] += 1
-                    self.expect("weight", norm(add(m[1:4], self.gravity, -dt * self.index(m[0]).mass)),
-                                (1e-9 * dt + TIMES * (1 + abs(start))) * bodies[m[0]].mass * norm(self.gravity), bodies[m[0]].name)
-        if norm(self.gravity) > 0 and dt > 0:
-            for k in to:
-                self.expect("weight acts", 1 - pushed[k], 0, bodies[k].name)
-        self.pulls(load, late, to)
-        for kind, m, _ in self.lines:
-            if kind == "law":
-                for i in range(10, len(m) - 6, 7):
-                    load(m[i], scaled(m[i + 1:i + 4], m[9]), scaled(m[i + 4:i + 7], m[9]))
-        free = {k: (b.state[7:10], b.state[10:13]) for k, b in bodies.items() if b.state}
-        for k in to:
-            b = bodies[k]
-            free[k] = (add(b.state[7:10], loads[k][0], 1 / b.mass), add(b.state[10:13], b.unspin(b.state[3:7], loads[k][1])))
-        for kind, m, _ in self.lines:
-            if kind == "contact":
-                for k, p, sign in ((m[0], m[2:5], 1), (m[1], m[5:8], -1)):
-                    if self.index(k).mass > 0:
-                        arm = add(p, bodies[k].state[:3], -1)
-                        load(k, scaled(m[16:19], sign), scaled(add(m[19:22], cross(arm, m[16:19])), sign))
-        mid = {k: (b.state[7:10], b.state[10:13]) for k, b in bodies.items() if b.state}
-        for k in to:
-            b = bodies[k]
-            mid[k] = (add(b.state[7:10], loads[k][0], 1 / b.mass), add(b.state[10:13], b.unspin(b.state[3:7], loads[k][1])))
-        via = {m[0]: (m[1:4], m[4:7]) for kind, m, _ in self.lines if kind == "via" and self.index(m[0])}
-        self.contacts(dt, composed, claimed, free, {**mid, **via})
-        self.laws(dt, composed, {**mid, **via})
-        placed = {m[0]: m[1:] for kind, m, _ in self.lines if kind == "placed" and self.index(m[0])}
-        reach = sum(abs(m[11]) for kind, m, _ in self.lines if kind == "contact")
-        for k in to:
-            self.moves(bodies[k], dt, loads[k], late[k], placed.get(k, bodies[k].state[:7]), to[k], reach)
-
-    def pulls(self, load, late, to):
-        """What joints do, with its reaction, along the directions that they hold."""
-        numbers = sorted(self.joints)
-        for kind, m, _ in self.lines:
-            if kind != "pull":
-                continue
-            couples = int(m[0]) - len(numbers)
-            if not -len(numbers) <= couples < len(self.coupled) or m[0] != int(m[0]):
-                raise Damaged(f"a pull of joint {m[0]:g}, which is not told")
-            joint = self.joints[self.coupled[couples][1] if couples >= 0 else m[0]]
-            states = [to.get(k, self.state(k)) if m[1] else self.state(k) for k in joint.bodies]
-            f1, m1, f2, m2 = m[2:5], m[5:8], m[8:11], m[11:14]
-            for k, force, torque in ((joint.bodies[0], f1, m1), (joint.bodies[1], f2, m2)):
-                if m[1]:
-                    load(k, force, torque, late)
-                else:
-                    load(k, force, torque)
-            held, turns, z = joint.directions(states)
-            if couples >= 0:
-                held, turns = ([z], []) if joint.kind == "slider" else ([], [z])
-            elif (self.block[0] == "instant" or self.block[1][1] == 0) and (joint.has_laws or any(m[0] == c[1] for c in self.coupled)) or joint.driven:
-                (held if joint.kind == "slider" else turns).append(z)
-                if joint.kind == "ball":
-                    turns += [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]
-            point = joint.places(states)[2]
-            about = [add(torque, cross(add(s[:3], point, -1), force))
-                     for s, force, torque in zip(states, (f1, f2), (m1, m2))]
-            size, sized = norm(f1) + norm(f2), norm(m1) + norm(m2)
-            arm = sum(norm(add(s[:3], point, -1)) for s in states)
-            self.expect("reaction", norm(add(f1, f2)), 1e-9 * size, joint.name)
-            self.expect("reaction", norm(add(*about)), HOLDS * (sized + size * (arm + 1e-3)), joint.name)
-            for what, total, along in (("force", f1, held), ("moment", about[0], turns)):
-                rest = total
-                for u in along:
-                    rest = add(rest, u, -dot(rest, u) / (dot(u, u) or 1))
-                self.expect(f"{what} of the joint's kind", norm(rest), HOLDS * (sized + size * (arm + 1e-3)) + 1e-12, joint.name)
-
-    def friction(self, first, second, states):
-        for a, b in ((first, second), (second, first)):
-            pair = self.pairs.get((self.index(a).material, self.index(b).material))
-            if pair:
-                along, sideways = (0.0, 0.0) if self.frictionless else pair[:2]
-                axis = turn(states[a][3:7], self.bodies[a].axis) if along != sideways else [0.0] * 3
-                return (along, sideways, axis, self.associated), pair[2:]
-        raise Damaged(f"bodies {self.bodies[first].name} and {self.bodies[second].name} have no pair")
-
-    def contacts(self, dt, composed, claimed, free, mid):
-        states, lines = {k: b.state for k, b in self.bodies.items()}, [m for kind, m, _ in self.lines if kind == "contact"]
-        worst, speed, name, near = 0.0, 0.0, "", collections.defaultdict(list)
-        for m in lines:
-            near[m[0], m[1]].append(m[2:5])
-        for m in lines:
-            first, second, n, gap, bias, slip, x, moment = m[0], m[1], m[8:11], m[11], m[12], m[13:16], m[16:19], m[19:22]
-            points = {first: m[2:5], second: m[5:8]}
-            what = f"{self.index(first).name} on {self.index(second).name}"
-            if first not in mid or second not in mid:
-                raise Damaged(f"contact of {what}: a body has no state")
-            friction, (restitution, rolling, torsional) = self.friction(first, second, states)
-            relative = lambda v: add(*[add(v[k][0], cross(v[k][1], add(points[k], states[k][:3], -1))) for k in (first, second)], -1)
-            came, comes, after = (relative(v) for v in ({k: (s[7:10], s[10:13]) for k, s in states.items()}, free, mid))
-            push, tangent = dot(x, n), add(x, n, -dot(x, n))
-            self.expect("points of contact", norm(add(m[5:8], m[2:5], -1)), abs(gap) * (1 + 1e-6) + 1e-9 * (1 + norm(m[2:5])), what)
-            self.expect("unit normal", abs(norm(n) - 1), 1e-9, what)
-            spin = dot(moment, n)
-            self.expect("moments of friction", max(abs(spin) - torsional * push, norm(add(moment, n, -spin)) - rolling * push),
-                        BALANCE * push, what)
-            inverse = sum(1 / self.bodies[k].mass for k in (first, second) if self.bodies[k].mass > 0)
-            most = max(norm(came), norm(comes))
-            tiny = BALANCE * norm(x) + (1e-9 * most / inverse if inverse > 0 else 0)
-            self.expect("contacts push", -push, tiny, what)
-            self.expect("Coulomb's cone", norm(tangent), max(friction[:2]) * push + tiny, what)
-            w = add(add(after, slip), n, bias)
-            off = natural_residual(friction, n, scaled(x, inverse), w)
-            turning = sum(norm(states[k][10:13]) + norm(mid[k][1]) for k in (first, second))
-            fast = sum(norm(states[k][7:10]) + norm(mid[k][0]) + norm(free[k][0]) + norm(mid[k][1]) * norm(add(points[k], states[k][:3], -1)) for k in (first, second))
-            speed = max(speed, norm(came) + norm(comes) + norm(slip) + abs(bias) + norm(x) * inverse + norm(self.gravity) * dt)
-            if off > worst:
-                worst, name = off, what
-            # The middle of the sub-step is this far from the start: bodies turn, their normal does along an edge,
-            # and points move in their face, or along a curve: an ellipsoid's radius is at most a^2 / height.
-            moving = [k for k in (first, second) if self.bodies[k].mass > 0]
-            arms = [max(norm(add(points[k], states[k][:3], -1)), 1e-300) for k in moving]
-            heights = [max(abs(dot(n, add(points[k], states[k][:3], -1))), 1e-300) for k in moving]
-            flat = max((5 * sum(self.bodies[k].inertia[i][i] for i in range(3)) / self.bodies[k].mass / height
-                        for k, height in zip(moving, heights)), default=0.0)
-            patch = max(norm(add(other, m[2:5], -1)) for other in near[first, second])
-            spins = norm(add(free[first][1], free[second][1], -1))
-            middle = dt * turning * fast + spins * patch + dt * spins * spins * flat + 1e-9 * (1 + fast)
-            middle += dt * most * most / min(arms, default=math.inf)
-            approach, comes_n = -dot(came, n), -dot(comes, n)
-            allowed = [max(gap, 0.0) / dt if dt > 0 else 0.0]
-            if comes_n * dt > gap or dt == 0:
-                allowed.append(0.0)
-                allowed.append(-restitution * min(approach, comes_n))
-            if not composed:
-                self.expect("restitution, or gap that closes", min(abs(bias - b) for b in allowed), middle, what)
-            belts = add(*[turn(states[k][3:7], add(self.bodies[k].belt[:3], cross(
-                self.bodies[k].belt[3:], turn(back(states[k][3:7]), add(points[k], states[k][:3], -1))))) for k in (first, second)], -1)
-            self.expect("surface speed", norm(add(slip, add(belts, n, -dot(belts, n)), -1)), middle, what)
-        if lines:
-            self.expect("residual as claimed", abs(claimed - worst), 1e-4 * worst + 1e-9 * speed, "contacts")
-            if not composed:
-                self.expect("law of contact", worst, max(LAW, 1e2 * self.claimed) * speed, name)
-        else:
-            self.expect("residual as claimed", abs(claimed), 0.0, "contacts")
-
-    def laws(self, dt, composed, mid):
-        for kind, m, _ in self.lines:
-            if kind != "law":
-                continue
-            if m[0] not in self.joints:
-                raise Damaged(f"a law of joint {m[0]:g}, which is not told")
-            law, gap, restitution, rate, bound, stretch, stiffness, damping, x = m[1:10]
-            speed, scale, inverse, came = 0.0, 1e-9, 0.0, 0.0
-            for i in range(10, len(m) - 6, 7):
-                v = mid[self.index(m[i]) and m[i]]
-                speed += dot(m[i + 1:i + 4], v[0]) + dot(m[i + 4:i + 7], v[1])
-                came += dot(m[i + 1:i + 4], self.bodies[m[i]].state[7:10]) + dot(m[i + 4:i + 7], self.bodies[m[i]].state[10:13])
-                b = self.bodies[m[i]]
-                inverse += dot(m[i + 1:i + 4], m[i + 1:i + 4]) / b.mass + dot(m[i + 4:i + 7], b.unspin(b.state[3:7], m[i + 4:i + 7]))
-            what = self.joints[m[0]].name
-            scale = abs(x) * inverse + abs(speed) + abs(came) + abs(rate) + abs(gap) / dt
-            if law == 0:
-                open_at = -gap / dt if gap > 0 else 0.0
-                floors = [open_at, 0.0, -restitution * came]
-                self.expect("limit", max(-x * inverse, min(open_at, 0) - speed), 1e-4 * scale, what)
-                if not composed:
-                    self.expect("limit", min(abs(min(x * inverse, speed - f)) for f in floors), 1e-4 * scale, what)
-            else:
-                if bound < math.inf:
-                    self.expect("bound", abs(x), bound * dt * (1 + 1e-6), what)
-                wanted = speed - rate
-                y = -dt * (stiffness * (stretch + dt * wanted) + damping * wanted) if law == 2 else x - wanted / (inverse or 1)
-                if not composed:
-                    self.expect("motor, friction or spring", abs(x - max(-bound * dt, min(bound * dt, y))) * inverse, 1e-4 * scale, what)
-
-    def moves(self, b, dt, load, late, placed, end, reach):
-        """Balances of a body over a sub-step; from where corrections have placed it to its end."""
-        q0, x1, q1, v1, w1 = b.state[3:7], end[:3], end[3:7], end[7:10], end[10:13]
-        change = add(v1, b.state[7:10], -1)
-        scale = load[2] + b.mass * (norm(change) + 1e-9 * (norm(v1) + norm(b.state[7:10])))
-        self.expect("balance of momentum", norm(add(add(scaled(change, b.mass), load[0], -1), late[0], -1)), BALANCE * scale, b.name)
-        corrected = times(placed[3:7], back(q0))
-        before = b.spin(q0, b.state[10:13])
-        middle = turn(corrected, add(before, load[1]))
-        momentum = self.keeps_momentum and not b.round
-        inside = b.unspin(placed[3:7], middle)
-        after = b.spin(q1 if momentum else placed[3:7], w1)
-        scale = load[3] + norm(add(after, before, -1)) + 1e-8 * (norm(after) + norm(before)) + 1e-6 * load[2] * (1 + norm(x1))
-        shifted = apart(corrected, [1.0, 0, 0, 0])
-        off = norm(add(add(after, middle, -1), late[1], -1))
-        self.expect("balance of angular momentum", off, BALANCE * scale + shifted * norm(middle) * (1 if norm(late[1]) else 0), b.name)
-        # Positions: by the velocity that the sub-step ends with, or along the parabola of free fall.
-        v = add(v1, late[0], -1 / b.mass)
-        moved = add(add(x1, placed[:3], -1), v, -dt)
-        if norm(moved) > 1e-9 * (norm(x1) + dt * norm(v)):
-            moved = add(moved, self.gravity, dt * dt / 2)
-        self.expect("places move as velocities", norm(moved), 1e-9 * (norm(x1) + dt * norm(v)) + 1e-6 * dt * norm(v), b.name)
-        if momentum:
-            ends = b.unspin(q1, middle)
-            way = scaled(add(turn(back(placed[3:7]), inside), turn(back(q1), ends)), dt / 2)
-            there = times(placed[3:7], rotation(way))
-        else:
-            there = times(rotation(scaled(add(w1, b.unspin(q1, late[1]), -1), dt)), placed[3:7])
-        self.expect("orientation moves as velocities", apart(there, q1), 1e-9 + 1e-6 * dt * norm(w1), b.name)
-        allowed = 10 * reach + HOLDS * (1 + norm(x1)) * 1e-2
-        self.expect("corrections close gaps", norm(add(placed[:3], b.state[:3], -1)), allowed, b.name)
-
-    def instant(self, n, to):
-        """Equations of motion: accelerations that the joints allow, and that lead from one instant to the next."""
-        bodies, loads = self.bodies, {k: [[0.0] * 3, [0.0] * 3, 0.0, 0.0] for k in to}
-        for k, state in to.items():
-            bodies[k].state = state
-
-        def load(k, force, torque):
-            if k in loads:
-                sizes = loads[k][2] + norm(force), loads[k][3] + norm(torque)
-                loads[k] = [add(loads[k][0], force), add(loads[k][1], torque), *sizes]
-
-        weights = collections.Counter()
-        for kind, m, text in self.lines:
-            if kind == "push":
-                load(m[0], m[1:4], m[4:7])
-                if text == "gravity":
-                    weights[m[0]] += 1
-                    mass = self.index(m[0]).mass
-                    self.expect("weight", norm(add(m[1:4], self.gravity, -mass)), 1e-9 * mass * norm(self.gravity), bodies[m[0]].name)
-            elif kind == "contact":
-                self.touch(m, load)
-        if norm(self.gravity) > 0:
-            for k in to:
-                self.expect("weight acts", 1 - weights[k], 0, bodies[k].name)
-        self.pulls(load, None, to)
-        now = {"t": n[0], "events": n[1], "bodies": {}}
-        rates = {m[0]: (m[1:4], m[4:7]) for kind, m, _ in self.lines if kind == "rate"}
-        if rates.keys() != to.keys():
-            raise Damaged("an acceleration is missing")
-        for k, (force, torque, forces, torques) in loads.items():
-            b, (a, alpha) = bodies[k], rates[k]
-            q, w = b.state[3:7], b.state[10:13]
-            gyroscopic, spun = cross(w, b.spin(q, w)), b.spin(q, alpha)
-            self.expect("equations of motion", norm(add(force, a, -b.mass)), EQUATIONS * (forces + b.mass * norm(a)), b.name)
-            self.expect("equations of rotation", norm(add(add(spun, gyroscopic), torque, -1)),
-                        EQUATIONS * (torques + norm(gyroscopic) + norm(spun)) + 1e-9 * (sum(map(norm, b.inertia)) + forces), b.name)
-            now["bodies"][k] = (b.state, a, alpha, torque, b.spin(q, w))
-        for joint in self.joints.values():
-            self.accelerates(joint, now)
-        self.past = (self.past if self.past and self.past[-1]["events"] == n[1] else [])[-3:] + [now]
-        if len(self.past) == 4:
-            self.leads()
-
-    def follows(self, time, to):
-        """Places by the mean of the velocities, over whatever time has passed."""
+        """Judges the block that has been read; outside of blocks places of fixed bodies are told."""
+        word, n = self.block or ("", [0.0])
+        self.to = to = {m[0]: State(V(m[1:4]), V(m[4:8]), V(m[8:11]), V(m[11:14])) for m, _ in self.told["to"]}
+        if any((self.bodies[k].mass > 0) != bool(word) for k in to):
+            raise Damaged("a fixed body moves, or one that moves is told outside of parts")
+        if word == "trial" and self.before is None:
+            self.before = {k: (b.state, b.time) for k, b in self.bodies.items()}
+        if word == "part" and self.before is not None:
+            self.trial = {k: b.state for k, b in self.bodies.items()}
+            for k, b in self.bodies.items():
+                b.state, b.time = self.before[k]
+            self.before = None
+        {"part": self.part, "trial": self.part, "extrapolated": self.extrapolated, "instant": self.instant, "arrives": self.follows,
+         "start": lambda t: None, "": lambda t: None}[word](*n)
         for k, s in to.items():
             b = self.bodies[k]
-            if b.state:
-                h = time - b.time
-                off = norm(add(add(s[:3], b.state[:3], -1), add(s[7:10], b.state[7:10]), -h / 2))
-                self.expect("time goes on", -h, 1e-9 * (1 + abs(time)), b.name)
-                self.expect("places follow velocities", off,
-                            1e-5 * (norm(s[:3]) + 0.1) + abs(h) / 4 * norm(add(s[7:10], b.state[7:10], -1)), b.name)
+            self.expect("fixed bodies rest", 0 if word else abs(s.v) + abs(s.w), 1, b.name)
+            self.expect("motion goes on", max(abs(x - y) for x, y in zip(s, b.state)) if word == "start" and b.state else 0, 1, b.name)
+            self.expect("unit length", abs(abs(s.q) - 1), 1, b.name)
+            b.state, b.time = s, n[0] + (n[1] if word in ("part", "trial") else 0)
+        for joint in self.joints.values():
+            if to.keys() & set(joint.bodies):
+                states = [self.bodies[k].state for k in joint.bodies]
+                arm = 1 + joint.arms + max(abs(s.x) for s in states)
+                off, slips, spins = joint.errors(states, max(self.bodies[k].time for k in joint.bodies))
+                self.expect("joints hold", max(map(abs, off)), arm, joint.name)
+                self.expect("joints' velocities", max(map(abs, slips + spins)), (1 + max(abs(s.v) + abs(s.w) * arm for s in states)) * arm, joint.name)
+        self.moved, self.block = self.moved or bool(word and to), None
+        self.told.clear()
 
-    def touch(self, m, load):
-        """A contact that holds or slides at an instant."""
-        first, second, p, n, slip, force, moment = m[0], m[1], m[2:5], m[8:11], m[13:16], m[16:19], m[19:22]
-        what = f"{self.index(first).name} on {self.index(second).name}"
-        states = {k: self.state(k) for k in (first, second)}
-        friction, (_, rolling, torsional) = self.friction(first, second, states)
-        v = {k: add(s[7:10], cross(s[10:13], add(p, s[:3], -1))) for k, s in states.items()}
-        w = add(add(v[first], v[second], -1), slip)
-        inverse = sum(1 / self.bodies[k].mass for k in (first, second) if self.bodies[k].mass > 0)
-        fast = 1e-4 * (1 + norm(v[first]) + norm(v[second]))
-        self.expect("law of contact", natural_residual(friction, n, scaled(force, inverse), w), fast + BALANCE * norm(force) * inverse, what)
-        self.expect("contact closed", max(abs(m[11]), norm(add(p, m[5:8], -1))), 1e-4, what)
-        push, spin = dot(force, n), dot(moment, n)
-        self.expect("moments of friction", max(abs(spin) - torsional * push, norm(add(moment, n, -spin)) - rolling * push), 1e-6 * push + 1e-9, what)
-        for k, sign in ((first, 1), (second, -1)):
-            load(k, scaled(force, sign), scaled(add(moment, cross(add(p, states[k][:3], -1), force)), sign))
+    def loads(self, dt):
+        """What acts on bodies but for contacts: impulses, of an instant (dt 1) forces; and what joints do along rows of the end."""
+        now, late, weights = {k: [] for k in self.to}, {k: [] for k in self.to}, collections.Counter()
+        for n, effect in self.told["push"]:
+            now[n[0]].append((V(n[1:4]), V(n[4:7])))
+            if effect == "gravity":
+                weights[n[0]] += 1
+                weight = self.gravity * self.bodies[n[0]].mass
+                self.expect("weight", abs(V(n[1:4]) - weight * dt), abs(weight) * dt, self.bodies[n[0]].name, TIMES * (1 + abs(self.when)) * abs(weight))
+        for k in now:
+            self.expect("weight acts", abs(1 - weights[k]) if dt > 0 and any(self.gravity) else 0, 1, self.bodies[k].name)
+        for n, _ in self.told["pull"]:
+            joint, at_end, wrenches = self.reacts[n[0]], n[1] != 0, ((V(n[2:5]), V(n[5:8])), (V(n[8:11]), V(n[11:14])))
+            for k, wrench in zip(joint.bodies, wrenches):
+                (late if at_end else now).get(k, []).append(wrench)
+            self.reaction(joint, n[0] not in self.joints, [self.to.get(k, self.bodies[k].state) if at_end else self.bodies[k].state
+                                                           for k in joint.bodies], wrenches)
+        for n, _ in self.told["law"]:
+            for i in range(10, len(n), 7):
+                now.get(n[i], []).append((V(n[i + 1:i + 4]) * n[9], V(n[i + 4:i + 7]) * n[9]))
+        return now, late
 
-    def accelerates(self, joint, now):
-        """The second derivatives of what a joint holds vanish."""
-        still = ([0.0] * 3, [0.0] * 3)
-        states = [self.state(k) for k in joint.bodies]
-        (a1, al1), (a2, al2) = (now["bodies"][k][1:3] if k in now["bodies"] else still for k in joint.bodies)
-        g1, g2, x1, x2, r1, r2 = joint.places(states)
-        w1, w2 = states[0][10:13], states[1][10:13]
-        rate = lambda v, w, r: add(v, cross(w, r))
-        grow = lambda a, al, w, r: add(add(a, cross(al, r)), cross(w, cross(w, r)))
-        d = add(x1, x2, -1)
-        d1 = add(rate(states[0][7:10], w1, r1), rate(states[1][7:10], w2, r2), -1)
-        d2 = add(grow(a1, al1, w1, r1), grow(a2, al2, w2, r2), -1)
-        scale = norm(a1) + norm(a2) + (norm(al1) + norm(w1) ** 2) * norm(r1) + (norm(al2) + norm(w2) ** 2) * norm(r2)
-        spin = norm(al1) + norm(al2) + norm(w1) ** 2 + norm(w2) ** 2
-        held, turns, z = joint.directions(states)
-        s2 = joint.way(now["t"])[2] if joint.driven else 0.0
-        if joint.kind == "distance":
-            u = held[0]
-            off = [dot(u, d2) + (dot(d1, d1) - dot(u, d1) ** 2) / (norm(d) or 1) - s2]
-            bad = []
+    def reaction(self, joint, couples, states, wrenches):
+        """It is opposite on both bodies, and along directions that the joint holds, drives or has laws of."""
+        p, _, _, held, turns, z = joint.place(states)
+        if couples:
+            held, turns = [], []
+        if couples or joint.has_laws and (self.block[0] == "instant" or self.block[1][1] == 0):
+            held, turns = (held + [z], turns) if joint.kind == "slider" else (held, [X, Y, Z] if joint.kind == "ball" else turns + [z])
+        about = [moment + ((s.x - p) ^ force) for s, (force, moment) in zip(states, wrenches)]
+        _, _, size, sized = total(wrenches)
+        sized += size * (sum(abs(s.x - p) for s in states) + 1e-3)
+        self.expect("reaction", abs(wrenches[0][0] + wrenches[1][0]), size, joint.name)
+        self.expect("moment of reaction", abs(about[0] + about[1]), sized, joint.name)
+        for rest, along in ((wrenches[0][0], held), (about[0], turns)):
+            for u in along:
+                rest = rest.beside(u.unit)
+            self.expect("reaction of the joint's kind", abs(rest), sized, joint.name, 1e-12)
+
+    def part(self, start, dt, composed, claimed):
+        """A sub-step, or an impact (dt 0): momenta change by the impulses, and contacts and joints obey their laws."""
+        for k in self.to:
+            self.expect("time goes on", abs(self.bodies[k].time - start), 1 + abs(start), self.bodies[k].name)
+        came = {k: b.state for k, b in self.bodies.items()}
+        loads, late = self.loads(dt)
+        free = {**came, **{k: self.bodies[k].struck(loads[k]) for k in loads}}
+        self.push_by_contacts(loads)
+        mid = {**came, **{k: self.bodies[k].struck(loads[k]) for k in loads}}
+        mid.update((n[0], State(NONE, NONE, V(n[1:4]), V(n[4:7]))) for n, _ in self.told["via"])
+        found = [self.contact(n, came, free, mid, dt, composed) for n, _ in self.told["contact"]] or [(0.0, 0.0, "contacts")]
+        worst, _, what = max(found, key=lambda each: each[0])
+        speed = max(each[1] for each in found)
+        self.expect("residual as claimed", abs(claimed - worst), worst, what, ROUNDING * speed)
+        self.expect("law of contact", 0 if composed else worst, max(1, 1e8 * self.claimed) * speed, what)
+        for n, _ in self.told["law"]:
+            self.joint_law(n, came, mid, dt, composed)
+        placed = {n[0]: (V(n[1:4]), V(n[4:8])) for n, _ in self.told["placed"]}
+        for k in self.to:
+            self.moves(self.bodies[k], dt, loads[k], late[k], *placed.get(k, self.bodies[k].state[:2]), self.to[k])
+
+    def push_by_contacts(self, loads):
+        for n, _ in self.told["contact"]:
+            for k, p, x in ((n[0], V(n[2:5]), V(n[16:22])), (n[1], V(n[5:8]), V(n[16:22]) * -1)):
+                loads.get(k, []).append((V(x[:3]), V(x[3:]) + ((p - self.bodies[k].state.x) ^ x)))
+
+    def friction(self, first, second):
+        for a, b in ((first, second), (second, first)):
+            if (a.material, b.material) in self.pairs:
+                along, sideways, *others = self.pairs[a.material, b.material]
+                along, sideways = (0, 0) if self.rules[1] == "frictionless" else (along, sideways)
+                axis = a.state.q.turn(a.surface[2]) if along != sideways else NONE
+                return (along, sideways, axis, self.rules[1] == "maximum_dissipation"), *others
+        raise Damaged(f"{first.name} and {second.name} have no pair")
+
+    def contact(self, n, came, free, mid, dt, composed):
+        """Its natural residual, m/s, the speeds that it is a part of, and its name; at an instant all motions are one."""
+        both, on, normal, gap, bias = n[:2], (V(n[2:5]), V(n[5:8])), V(n[8:11]), n[11], n[12]
+        slip, x, moment = V(n[13:16]), V(n[16:19]), V(n[19:22])
+        bodies = [self.bodies[k] for k in both]
+        what, arms = " on ".join(b.name for b in bodies), [p - b.state.x for p, b in zip(on, bodies)]
+        friction, restitution, rolling, torsional = self.friction(*bodies)
+        came_w, comes_w, w = ((s[both[0]].v + (s[both[0]].w ^ arms[0])) - (s[both[1]].v + (s[both[1]].w ^ arms[1])) for s in (came, free, mid))
+        push, spin, moving = x @ normal, moment @ normal, [(b, r) for b, r in zip(bodies, arms) if b.mass > 0]
+        inverse, most = sum(1 / b.mass for b, _ in moving), max(abs(came_w), abs(comes_w))
+        self.expect("points of contact", abs(on[0] - on[1]), abs(gap), what, ROUNDING * (1 + abs(on[0])))
+        self.expect("unit length", abs(abs(normal) - 1), 1, what)
+        self.expect("moments of friction", max(abs(spin) - torsional * push, abs(moment.beside(normal)) - rolling * push), push, what, ROUNDING)
+        # A sub-step obeys its laws in its middle, which is this far from its start: bodies turn, their normal does along an edge,
+        # and points move in their face, or along a curve: an ellipsoid's radius is at most a^2 / height.
+        fast = sum(abs(came[k].v) + abs(mid[k].v) + abs(free[k].v) + abs(mid[k].w) * abs(r) for k, r in zip(both, arms))
+        spins, patch = abs(free[both[0]].w - free[both[1]].w), max(abs(V(m[2:5]) - on[0]) for m, _ in self.told["contact"] if m[:2] == both)
+        flat = max((5 * b.trace / b.mass / max(abs(r @ normal), 1e-300) for b, r in moving), default=0.0)
+        bends = most * most / max(min((abs(r) for _, r in moving), default=math.inf), 1e-300)
+        middle = dt * (sum(abs(came[k].w) + abs(mid[k].w) for k in both) * fast + spins * spins * flat + bends) + spins * patch
+        belts = [b.state.q.turn(b.surface[0] + (b.surface[1] ^ b.state.q.back.turn(r))) for b, r in zip(bodies, arms)]
+        self.expect("surface speed", abs(slip - (belts[0] - belts[1]).beside(normal)), middle, what, ROUNDING * (1 + fast))
+        off = natural_residual(friction, normal, x * inverse, w + slip + normal * bias)
+        if self.block[0] == "instant":
+            self.expect("contact closed", abs(gap), 1, what)
+            return self.expect("law of contact at an instant", off, 1 + fast, what, 1e-6 * abs(x) * inverse)
+        self.expect("contact pushes within its cone", max(-push, abs(x.beside(normal)) - max(friction[:2]) * push), abs(x), what,
+                    ROUNDING * most / (inverse or math.inf))
+        biases = [max(gap, 0.0) / dt if dt > 0 else 0.0]
+        if -(comes_w @ normal) * dt > gap or dt == 0:
+            biases += [0.0, restitution * max(came_w @ normal, comes_w @ normal)]
+        self.expect("restitution, or gap that closes", 0 if composed else min(abs(bias - each) for each in biases), middle, what, ROUNDING * (1 + fast))
+        return off, abs(came_w) + abs(comes_w) + abs(slip) + abs(bias) + abs(x) * inverse + abs(self.gravity) * dt, what
+
+    def joint_law(self, n, came, mid, dt, composed):
+        """A limit (0), or what is bounded (1) or sprung (2) of a joint: its impulse is in bounds, and there where its speed is not as wanted."""
+        law, gap, restitution, rate, bound, stretch, stiffness, damping, x = n[1:10]
+        rows = {n[i]: (V(n[i + 1:i + 4]), V(n[i + 4:i + 7])) for i in range(10, len(n), 7)}
+        before, speed = (sum(f @ s[k].v + m @ s[k].w for k, (f, m) in rows.items()) for s in (came, mid))
+        inverse = sum(f @ f / b.mass + m @ b.spin(b.state.q, m, b.inverse) for b, (f, m) in ((self.bodies[k], row) for k, row in rows.items()) if b.mass)
+        low, high = (0.0, math.inf) if law == 0 else (-bound * dt, bound * dt)
+        wanted = [min(-gap / dt, 0.0), 0.0, -restitution * before] if law == 0 else [rate]
+        there = [x] if composed else [x - (speed - each) / (inverse or 1) for each in wanted]
+        if law == 2 and not composed:
+            there = [-dt * (stiffness * (stretch + dt * (speed - rate)) + damping * (speed - rate))]
+        off = min(abs(x - max(low, min(high, each))) for each in there) * inverse
+        self.expect("limit, motor, friction or spring", off, abs(x) * inverse + abs(speed) + abs(before) + abs(rate) + abs(gap) / dt, self.joints[n[0]].name)
+
+    def moves(self, b, dt, loads, lates, x, q, end):
+        """Balances of a body over a sub-step; from x and q, where corrections have placed it, to its end."""
+        s, (impulse, moment, size, sized), (late, late_moment, late_size, late_sized) = b.state, total(loads), total(lates)
+        change, v = end.v - s.v, end.v - late * (1 / b.mass)
+        self.expect("balance of momentum", abs(change * b.mass - impulse - late),
+                    size + late_size + b.mass * (abs(change) + ROUNDING * (abs(end.v) + abs(s.v))), b.name)
+        keeps, corrected, before = self.rules[0] == "momentum" and not b.round, s.q.back.then(q), b.spin(s.q, s.w)
+        middle, after = corrected.turn(before + moment), b.spin(end.q if keeps else q, end.w)
+        self.expect("balance of angular momentum", abs(after - middle - late_moment), sized + late_sized + abs(after - before) + 1e-8
+                    * (abs(after) + abs(before)) + 1e-6 * size * (1 + abs(end.x)), b.name, corrected.apart(STILL.q) * abs(middle) if late_sized else 0)
+        # Places: by the velocity that the sub-step ends with, or along the parabola of free fall.
+        left = min(end.x - x - v * dt, end.x - x - v * dt + self.gravity * (dt * dt / 2), key=abs)
+        self.expect("places move as velocities", abs(left), dt * abs(v), b.name, ROUNDING * (abs(end.x) + dt * abs(v)))
+        if keeps:
+            there = rotation(sum((each.back.turn(b.spin(each, middle, b.inverse)) for each in (q, end.q)), NONE) * (dt / 2)).then(q)
         else:
-            second = lambda k: dot(k, d2) + 2 * dot(cross(w2, k), d1) + dot(grow([0.0] * 3, al2, w2, k), d)
-            off = [second(k) for k in held]
-            if joint.kind == "slider" and joint.driven:
-                off.append(second(z) - s2)
-            w, al = add(w1, w2, -1), add(al1, al2, -1)
-            bad = [dot(k, al) + dot(cross(w2, k), w) for k in turns]
-            if joint.kind == "universal":
-                a, b = turn(g1, [0, 0, 1.0]), turn(g2, [1.0, 0, 0])
-                bad = [dot(turns[0], al) + dot(add(cross(cross(w1, a), b), cross(a, cross(w2, b))), w)]
-            if joint.kind == "hinge" and joint.driven:
-                bad.append(dot(z, al) + dot(cross(w2, z), w) - s2)
-        self.expect("joint's acceleration", max(map(abs, off)), 1e-4 * (scale + abs(s2)) + 1e-6, joint.name)
-        if bad:
-            self.expect("joint's angular acceleration", max(map(abs, bad)), 1e-4 * (spin + abs(s2)) + 1e-6, joint.name)
+            there = q.then(rotation((end.w - b.spin(end.q, late_moment, b.inverse)) * dt))
+        self.expect("orientation moves as velocities", there.apart(end.q), dt * abs(end.w), b.name, ROUNDING)
+        self.expect("corrections close gaps", abs(x - s.x), sum(abs(n[11]) for n, _ in self.told["contact"]), b.name, 1e-8 * (1 + abs(end.x)))
 
-    def leads(self):
+    def extrapolated(self, _):
+        """Twice the two halves less the whole sub-step; a body that no moment acts on keeps the turn of its halves."""
+        for k, s in self.to.items():
+            half, whole = self.bodies[k].state, self.trial[k]
+            x, _, v, w = (a * 2 - b for a, b in zip(half, whole))
+            size = abs(half.x - whole.x) + half.q.apart(whole.q) + abs(half.v - whole.v) + abs(half.w - whole.w)
+            off = (abs(s.x - x), abs(s.v - v), min(abs(s.w - w), abs(s.w - half.w)),
+                   min(half.q.then(whole.q.back).then(half.q).apart(s.q), half.q.apart(s.q)))
+            self.expect("extrapolation", max(off), size, self.bodies[k].name, ROUNDING * (1 + abs(half.x)))
+
+    def follows(self, when):
+        """Places by the mean of the velocities, over whatever time has passed."""
+        for k, s in self.to.items():
+            b, h = self.bodies[k], when - self.bodies[k].time
+            if b.state:
+                self.expect("time goes on", -h, 1 + abs(when), b.name)
+                self.expect("places follow velocities", abs(s.x - b.state.x - (s.v + b.state.v) * (h / 2)), abs(s.x) + 0.1, b.name,
+                            abs(h) / 4 * abs(s.v - b.state.v))
+
+    def instant(self, when, events):
+        """Equations of motion: accelerations by the forces, as the joints allow them, and as the next instants tell."""
+        self.follows(when)
+        for k, s in self.to.items():
+            self.bodies[k].state = s
+        loads, _ = self.loads(1)
+        self.push_by_contacts(loads)
+        states = {k: b.state for k, b in self.bodies.items()}
+        for n, _ in self.told["contact"]:
+            self.contact(n, states, states, states, 0, False)
+        rates, now = {n[0]: (V(n[1:4]), V(n[4:7])) for n, _ in self.told["rate"]}, {}
+        for k, s in self.to.items():
+            b, (a, alpha), (force, torque, size, sized) = self.bodies[k], rates[k], total(loads[k])
+            momentum, spun = b.spin(s.q, s.w), b.spin(s.q, alpha)
+            self.expect("equations of motion", abs(force - a * b.mass), size + b.mass * abs(a), b.name)
+            self.expect("equations of rotation", abs(spun + (s.w ^ momentum) - torque), sized + abs(s.w ^ momentum) + abs(spun), b.name,
+                        ROUNDING * (sum(map(abs, b.rows)) + size))
+            now[k] = {"momentum leads on": (s.v, a, 0.1), "angular momentum leads on": (momentum, torque, 0.1 * b.trace),
+                      "places lead on": (s.x, s.v, 0.1), "orientation leads on": (s.q, s.w, 0)}
+        for joint in self.joints.values():
+            joined, of = [rates.get(k, (NONE, NONE)) for k in joint.bodies], [states[k] for k in joint.bodies]
+            spins = sum(abs(alpha) + s.w @ s.w for s, (_, alpha) in zip(of, joined))
+            for off, size in zip(joint.accelerations(of, joined, when), (sum(abs(a) for a, _ in joined) + spins * joint.arms, spins)):
+                self.expect("joints' accelerations", max(map(abs, off), default=0), size, joint.name, 1e-6)
+        if self.past and self.past[-1][1] != events:
+            self.past.clear()
+        self.past.append((when, events, now))
+        if len(self.past) == 4:
+            self.leads(*(each[0] for each in self.past))
+
+    def leads(self, t0, t1, t2, t3):
         """From the second to the third of four instants, by fourth order; its error is judged by the second."""
-        p = self.past
-        h = p[2]["t"] - p[1]["t"]
-        for k, (s0, a0, al0, t0, l0) in p[1]["bodies"].items():
-            if not all(k in each["bodies"] for each in p):
-                continue
-            s1, a1, al1, t1, l1 = p[2]["bodies"][k]
-            four = [each["bodies"][k] for each in p]
-            size = 0.1 * sum(self.bodies[k].inertia[i][i] for i in range(3))
-            for law, value, rate, tiny in (("momentum", lambda b: b[0][7:10], lambda b: b[1], 0.1), ("angular momentum", lambda b: b[4], lambda b: b[3], size),
-                                           ("places", lambda b: b[0][:3], lambda b: b[0][7:10], 0.1)):
-                f = [rate(b) for b in four]
-                second = [scaled(add(f[i + 1], f[i - 1], -1), 1 / (p[i + 1]["t"] - p[i - 1]["t"])) for i in (1, 2)]
-                before, after = value(four[1]), value(four[2])
-                lead = add(scaled(add(f[1], f[2]), h / 2), scaled(add(*second, -1), h * h / 12))
-                third = add(add(f[3], f[2], -3), add(f[0], f[1], -3), -1)
-                bound = 1e-5 * (norm(before) + norm(after) + tiny) + h * h / 20 * (norm(second[0]) + norm(second[1])) + h / 5 * norm(third)
-                self.expect(f"{law} between instants", norm(add(add(after, before, -1), lead, -1)), bound, self.bodies[k].name)
-            way = add(scaled(add(s0[10:13], s1[10:13]), h / 2), scaled(add(al0, al1, -1), h * h / 12))
-            bent = h * h / 6 * norm(cross(s0[10:13], s1[10:13])) + 0.2 * h * h / 12 * norm(add(al0, al1, -1))
-            self.expect("orientation between instants", apart(times(rotation(way), s0[3:7]), s1[3:7]), 1e-5 + bent, self.bodies[k].name)
-
-    def extrapolated(self, to):
-        if not isinstance(self.trial, list):
-            raise Damaged("an extrapolation without its trial")
-        for k, state in to.items():
-            b, half, whole = self.bodies[k], self.bodies[k].state, self.trial[0].get(k)
-            best = [2 * h - w for h, w in zip(half, whole)]
-            size = 1e-9 * (1 + norm(half)) + 1e-6 * norm(add(half, whole, -1))
-            self.expect("extrapolation", norm(add(state[:3], best[:3], -1)) + norm(add(state[7:10], best[7:10], -1)), size, b.name)
-            turned = times(half[3:7], back(whole[3:7]))
-            self.expect("extrapolation", min(norm(add(state[10:], best[10:], -1)), norm(add(state[10:], half[10:], -1))), size, b.name)
-            self.expect("extrapolation", min(apart(times(turned, half[3:7]), state[3:7]), apart(half[3:7], state[3:7])), size, b.name)
-        self.trial = None
+        h = t2 - t1
+        for k in self.to:
+            for law, (y1, f1, tiny) in self.past[1][2][k].items():
+                (_, f0, _), _, (y2, f2, _), (_, f3, _) = (each[2][k][law] for each in self.past)
+                g1, g2 = (f2 - f0) * (1 / (t2 - t0)), (f3 - f1) * (1 / (t3 - t1))
+                way, turns = (f1 + f2) * (h / 2) + (g1 - g2) * (h * h / 12), law == "orientation leads on"
+                off = y1.then(rotation(way)).apart(y2) if turns else abs(y2 - y1 - way)
+                self.expect(law, off, abs(y1) + abs(y2) + tiny, self.bodies[k].name, h * h / 20 * (abs(g1) + abs(g2)) + h / 5 * abs(f3 - f0 + (f1 - f2) * 3)
+                            + (h * h / 6 * abs(f1 ^ f2) if turns else 0))
 
 
-def main():
-    worst = 0
-    for file in sys.argv[1:]:
+def main(files):
+    worst = 0 if files else print(__doc__) or 2
+    for file in files:
+        judge = Judge()
         try:
-            judge = Judge().run(file)
-        except (Damaged, OSError, IndexError, KeyError, ValueError, ZeroDivisionError, OverflowError, TypeError) as why:
-            print(f"{file}: cannot be judged: {why}")
-            worst = max(worst, 2)
+            judge.run(file)
+        except (Damaged, OSError, ArithmeticError, LookupError, ValueError, AttributeError, TypeError) as why:
+            words = {LookupError: "a line names what is not told", ArithmeticError: "numbers beyond all bounds", ValueError: "numbers that are none",
+                     AttributeError: "a state is missing", TypeError: "a state is missing"}
+            what = next((f" (block of line {judge.line}) {text}:" for kind, text in words.items() if isinstance(why, kind)), "")
+            print(f"{file}: cannot be judged:{what} {why}")
+            worst = 2
             continue
         for fault in judge.faults[:10]:
             print(f"{file}: {fault}")
-        print(f"{file}: {'holds' if not judge.faults else f'{len(judge.faults)} laws broken'}, {sum(judge.judged.values())} judgements")
+        print(f"{file}: {f'{len(judge.faults)} laws broken' if judge.faults else 'holds'}, {sum(judge.judged.values())} judgements")
         worst = max(worst, 1 if judge.faults else 0)
-    return worst if len(sys.argv) > 1 else print(__doc__) or 2
+    return worst
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -2,6 +2,7 @@
 """Do both judges pass certificates as they are, and find a hundred planted faults? SPDX-License-Identifier: BSD-3-Clause
 
     verify_faults.py TETHER SCENES"""
+import contextlib
 import math
 import os
 import pathlib
@@ -13,6 +14,7 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scene" / "tools"))
 import verify  # noqa: E402
+from verify import V, rotation  # noqa: E402
 
 SCENES = {"rolling_sphere": 0.02, "icy_wedge": 0.01, "stack": 0.1, "cart": 0.02, "gripper": 0.02, "pulled_block": 0.2, "bricard": 0.2,
           "clearance": 0.002, "hanging_frame": 1.0}
@@ -42,7 +44,7 @@ def put(lines, k, n):
 
 
 def pressed(n):
-    return verify.norm(n[16:19]) > 0.1 * PRESS
+    return abs(V(n[16:19])) > 0.1 * PRESS
 
 
 PRESS = 0.0  # the largest impulse or force of a contact of the certificate
@@ -50,29 +52,27 @@ PRESS = 0.0  # the largest impulse or force of a contact of the certificate
 
 def off_the_cone(random_, lines):
     k, n = pick(random_, lines, "contact", pressed)
-    n[16:19] = verify.add(n[16:19], verify.across(n[8:11]), 3 * verify.norm(n[16:19]))
+    x = V(n[16:19])
+    n[16:19] = x + V(n[8:11]).across() * (3 * abs(x))
     put(lines, k, n)
 
 
 def swapped_sign(random_, lines):
     k, n = pick(random_, lines, "contact", pressed)
-    n[16:19] = verify.scaled(n[16:19], -1)
+    n[16:19] = V(n[16:19]) * -1
     put(lines, k, n)
 
 
 def turned_friction(random_, lines):
-    def rubs(n):
-        return verify.norm(verify.add(n[16:19], n[8:11], -verify.dot(n[16:19], n[8:11]))) > 1e-2 * PRESS
-    k, n = pick(random_, lines, "contact", rubs)
-    push = verify.dot(n[16:19], n[8:11])
-    along = verify.add(n[16:19], n[8:11], -push)
-    n[16:19] = verify.add(verify.scaled(n[8:11], push), verify.cross(n[8:11], along))
+    k, n = pick(random_, lines, "contact", lambda n: abs(V(n[16:19]).beside(V(n[8:11]))) > 1e-2 * PRESS)
+    x, normal = V(n[16:19]), V(n[8:11])
+    n[16:19] = x - x.beside(normal) + (normal ^ x)
     put(lines, k, n)
 
 
 def weaker_contact(random_, lines):
     k, n = pick(random_, lines, "contact", pressed)
-    n[16:19] = verify.scaled(n[16:19], 1 - PART)
+    n[16:19] = V(n[16:19]) * (1 - PART)
     put(lines, k, n)
 
 
@@ -101,7 +101,7 @@ def faster(random_, lines):
 
 
 def joints_pull(random_, lines):
-    k, n = pick(random_, lines, "pull", lambda n: verify.norm(n[2:5]) > 0.1 * PULL)
+    k, n = pick(random_, lines, "pull", lambda n: abs(V(n[2:5])) > 0.1 * PULL)
     n[2 + max(range(3), key=lambda i: abs(n[2 + i]))] *= 1 + PART
     put(lines, k, n)
 
@@ -123,7 +123,7 @@ def lost_push(random_, lines):
 
 def turned_body(random_, lines):
     k, n = pick(random_, lines[20:], "to")
-    n[4:8] = verify.times(verify.rotation([0.01, 0.0, 0.0]), n[4:8])
+    n[4:8] = V(n[4:8]).then(rotation(V((0.01, 0.0, 0.0))))
     put(lines, k + 20, n)
 
 
@@ -176,11 +176,18 @@ def damaged(random_, program, file, lines):
                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)))
         if run.returncode != 2 or "longer than any" not in run.stdout + run.stderr:
             bad.append(f"16 GiB without an end of line: {run.returncode}")
-    for _ in range(100):
+    for k in range(200):
         at, wild = random_.randrange(len(text)), random_.choice(["\0", "e999", "-", "nan", " ", "\n", "1e308", "\xff"])
-        file.write_text(text[:at] + wild + text[at + 1:])
-        if subprocess.run([program, "verify", str(file)], capture_output=True).returncode not in (0, 1, 2):
-            bad.append(f"{wild!r} at {at}")
+        wrong = text[:at] + wild + text[at + 1:]
+        if k % 2:  # a number, not a byte
+            fields = text.split(" ")
+            fields[random_.randrange(len(fields))] = random_.choice(["0", "-1", "1e308", "-1e200", "1e-320", "3.5"])
+            wrong = " ".join(fields)
+        file.write_text(wrong)
+        with contextlib.redirect_stdout(None):
+            codes = subprocess.run([program, "verify", str(file)], capture_output=True).returncode, verify.main([str(file)])
+        if not {0, 1, 2}.issuperset(codes):
+            bad.append(f"exit codes {codes}")
     return bad
 
 
@@ -201,8 +208,8 @@ def main(program, scenes):
         while planted < 100:
             fault, name = FAULTS[planted % len(FAULTS)], random_.choice(sorted(whole))
             lines = list(whole[name])
-            PRESS = max((verify.norm(numbers(each)[16:19]) for each in lines if each.startswith("contact ")), default=math.inf)
-            PULL = max((verify.norm(numbers(each)[2:5]) for each in lines if each.startswith("pull ")), default=math.inf)
+            PRESS = max((abs(V(numbers(each)[16:19])) for each in lines if each.startswith("contact ")), default=math.inf)
+            PULL = max((abs(V(numbers(each)[2:5])) for each in lines if each.startswith("pull ")), default=math.inf)
             try:
                 fault(random_, lines)
             except IndexError:  # nothing of the kind in it

@@ -10,10 +10,8 @@ namespace tether::scene::certificate {
 
 namespace {
 
-bool is_in_block(const std::string& word) {
-  for (const char* each : {"push", "contact", "pull", "law", "via", "placed", "rate"})
-    if (word == each) return true;
-  return false;
+bool is_one_of(const std::string& word, std::initializer_list<const char*> words) {
+  return std::find(words.begin(), words.end(), word) != words.end();
 }
 
 }  // namespace
@@ -22,9 +20,10 @@ Verdict Judge::run(const std::string& file) {
   Reader reader(file);
   Record line;
   while (reader.next(line)) {
-    if (is_in_block(line.word) && !block_) throw Damaged(line.word + " is of no part");
-    if (line.word == "to") body(line.numbers[0]);
-    if (is_in_block(line.word) || line.word == "to") {
+    const bool of_block =
+        is_one_of(line.word, {"push", "contact", "pull", "law", "via", "placed", "rate"});
+    if (of_block && !block_) throw Damaged(line.word + " is of no part");
+    if (of_block || line.word == "to") {
       lines_.push_back(line);
       continue;
     }
@@ -84,7 +83,7 @@ void Judge::head(const Record& line) {
   head_of_bodies(line);
   if (word == "gravity") gravity_ = vector(n, 0);
   if (word == "engine") {
-    joints_.clear(), coupled_.clear(), past_.clear();
+    joints_.clear(), reacts_.clear(), past_.clear();
     keeps_momentum_ = line.text.find(" momentum ") != std::string::npos;
     associated_ = line.text.find(" maximum_dissipation") != std::string::npos;
     frictionless_ = line.text.find(" frictionless") != std::string::npos;
@@ -94,10 +93,12 @@ void Judge::head(const Record& line) {
     for (const double b : joint.body)
       if (b != -1) body(b);
     joints_.insert_or_assign(n[0], joint);
+    reacts_[n[0]] = n[0];
   }
   if (word == "coupled") {
     if (joints_.count(n[1]) == 0) throw Damaged("a coupling of a joint that is not told");
-    coupled_.emplace_back(n[0], n[1]);
+    joints_.at(n[1]).has_laws = true;
+    reacts_[static_cast<double>(reacts_.size())] = n[1];
   }
   if (word == "step" || word == "end")
     end_of_step(word == "step" ? std::optional(n[1]) : std::nullopt);
@@ -106,8 +107,8 @@ void Judge::head(const Record& line) {
     expect("contact problems solved", std::abs(n[4] - 1), 0, "step");
     expect("residual of contact problems", std::abs(claimed_), kUseful, "step");
   }
-  for (const char* each : {"part", "trial", "instant", "arrives", "extrapolated", "start"})
-    if (word == each) block_ = line, when_ = n[0];
+  if (is_one_of(word, {"part", "trial", "instant", "arrives", "extrapolated", "start"}))
+    block_ = line, when_ = n[0];
 }
 
 // All bodies have reached the end of the step, where the next one begins.
@@ -119,52 +120,47 @@ void Judge::end_of_step(std::optional<double> start) {
   if (start) expect("time goes on", std::abs(*start - *until_), slack, "step");
 }
 
+// Judges the block that has been read; outside of blocks places of fixed bodies are told.
 void Judge::finish() {
-  if (!block_)
-    for (const Record& line : lines_) rests(body(line.numbers[0]), told(line.numbers, 1));
-  else
-    judge_block();
+  const std::string word = block_ ? block_->word : "";
+  States to;
+  each("to", [&](const auto& m, const auto&) {
+    if ((body(m[0]).mass > 0) != block_.has_value())
+      throw Damaged(body(m[0]).name + " is fixed and moves, or moves outside of parts");
+    Told& s = to[m[0]];
+    s.x = vector(m, 1), s.q = quaternion(m, 4), s.v = vector(m, 8), s.w = vector(m, 11);
+  });
+  if (word == "trial" && before_trial_.empty())
+    for (const auto& [number, b] : bodies_) before_trial_[number] = {b.state, b.time};
+  if (word == "part" && !before_trial_.empty()) {
+    trial_ = told_states();
+    for (auto& [number, b] : bodies_) std::tie(b.state, b.time) = before_trial_[number];
+    before_trial_.clear();
+  }
+  const bool moves = word == "part" || word == "trial";
+  if (moves) part(to);
+  if (word == "extrapolated") extrapolated(to);
+  if (word == "instant" || word == "arrives") follows(to);
+  if (word == "instant") instant(to);
+  for (const auto& [number, s] : to) {
+    JudgedBody& b = body(number);
+    if (!block_) expect("fixed bodies rest", s.v.norm() + s.w.norm(), 0, b.name);
+    if (word == "start" && b.state) expect("motion goes on", apart(*b.state, s), 1e-6, b.name);
+    expect("unit orientation", std::abs(s.q.norm() - 1), kRounding, b.name);
+    b.state = s;
+    b.time = block_ ? block_->numbers[0] + (moves ? block_->numbers[1] : 0) : 0;
+  }
+  hold(to);
+  moved_ = moved_ || (block_ && !to.empty());
   block_.reset();
   lines_.clear();
 }
 
-// Outside of blocks places of fixed bodies are told.
-void Judge::rests(JudgedBody& b, const Told& s) {
-  expect("unit orientation", std::abs(s.q.norm() - 1), kRounding, b.name);
-  expect("fixed bodies rest", s.v.norm() + s.w.norm(), 0, b.name);
-  b.state = s;
-}
-
-void Judge::judge_block() {
-  const std::string& word = block_->word;
-  const std::vector<double>& n = block_->numbers;
-  States to;
-  each("to", [&](const auto& m, const auto&) { to[m[0]] = told(m, 1); });
-  for (const auto& [number, s] : to)
-    if (!(body(number).mass > 0)) throw Damaged(body(number).name + " is fixed and moves");
-  if (word == "trial" && before_trial_.empty())
-    for (const auto& [number, b] : bodies_) before_trial_[number] = {b.state, b.time};
-  if (word == "part" && !before_trial_.empty()) {
-    trial_.clear();
-    for (auto& [number, b] : bodies_) {
-      if (b.state) trial_[number] = *b.state;
-      std::tie(b.state, b.time) = before_trial_[number];
-    }
-    before_trial_.clear();
-  }
-  if (word == "part" || word == "trial") part(to);
-  if (word == "extrapolated") extrapolated(to);
-  if (word == "instant" || word == "arrives") follows(to);
-  if (word == "instant") instant(to);
-  moved_ = moved_ || !to.empty();
-  for (const auto& [number, s] : to) {
-    JudgedBody& b = body(number);
-    if (word == "start" && b.state) expect("motion goes on", apart(*b.state, s), 1e-6, b.name);
-    b.state = s;
-    b.time = n[0] + (word == "part" || word == "trial" ? n[1] : 0);
-    expect("unit orientation", std::abs(s.q.norm() - 1), kRounding, b.name);
-  }
-  hold(to);
+Judge::States Judge::told_states() const {
+  States out;
+  for (const auto& [number, b] : bodies_)
+    if (b.state) out[number] = *b.state;
+  return out;
 }
 
 void Judge::hold(const States& to) {
@@ -176,9 +172,11 @@ void Judge::hold(const States& to) {
       fast = std::max(fast, 1 + s[k].v.norm() + s[k].w.norm() * arm);
       if (joint.body[k] >= 0) time = std::max(time, body(joint.body[k]).time);
     }
-    const auto [off, slips] = joint.errors(s, time);
-    expect("joints hold", off, kHolds * arm, joint.name);
-    expect("joints' velocities", slips, kHolds * fast * arm, joint.name);
+    const JudgedJoint::Errors e = joint.errors(s, time);
+    for (const double off : e.off) expect("joints hold", std::abs(off), kHolds * arm, joint.name);
+    for (const std::vector<double>* all : {&e.slips, &e.spins})
+      for (const double slip : *all)
+        expect("joints' velocities", std::abs(slip), kHolds * fast * arm, joint.name);
   }
 }
 
@@ -202,69 +200,126 @@ void Judge::push(double factor, const States& to, Loads& loads) {
 
 void Judge::pull(const States& to, Loads& loads, Loads& late) {
   each("pull", [&](const auto& n, const auto&) {
-    const auto count = static_cast<double>(joints_.size());
-    const double part = n[0] - count;
-    const bool couples = part >= 0;
-    if (n[0] != std::floor(n[0]) || part >= static_cast<double>(coupled_.size()) ||
-        (!couples && joints_.count(n[0]) == 0))
+    const auto found = reacts_.find(n[0]);
+    if (found == reacts_.end())
       throw Damaged(fmt::format("a pull of joint {}, which is not told", n[0]));
-    const JudgedJoint& joint =
-        joints_.at(couples ? coupled_[static_cast<std::size_t>(part)].second : n[0]);
+    const JudgedJoint& joint = joints_.at(found->second);
     const States* at = n[1] != 0 ? &to : nullptr;
     const Told s[2] = {state(joint.body[0], at), state(joint.body[1], at)};
-    for (int k = 0; k < 2; ++k) {
-      const std::size_t from = k == 0 ? 2 : 8;
-      if (to.count(joint.body[k]) == 0) continue;
-      (n[1] != 0 ? late : loads)[joint.body[k]].add(vector(n, from), vector(n, from + 3));
-    }
-    pull_of(joint, n, couples, s);
+    for (std::size_t k = 0; k < 2; ++k)
+      if (to.count(joint.body[k]) > 0)
+        (n[1] != 0 ? late : loads)[joint.body[k]].add(vector(n, 2 + 6 * k), vector(n, 5 + 6 * k));
+    pull_of(joint, n, joints_.count(n[0]) == 0, s);
   });
 }
 
-// A reaction is opposite on both bodies, and along directions that the joint holds or drives.
+// A reaction is opposite on both bodies, and along directions that the joint holds, drives or, at
+// once, has laws of.
 void Judge::pull_of(const JudgedJoint& joint, const std::vector<double>& n, bool couples,
                     const Told (&s)[2]) {
   JudgedJoint::Place p = joint.place(s);
-  const bool slides = joint.kind == "slider";
-  bool drives = joint.driven;
-  if (block_->word == "instant" || block_->numbers[1] == 0) {
-    drives = drives || joint.has_laws;
-    for (const auto& [coupling, number] : coupled_) drives = drives || number == n[0];
-  }
   if (couples) p.held.clear(), p.turns.clear();
-  if (couples || drives) (slides ? p.held : p.turns).push_back(p.z);
-  if (drives && joint.kind == "ball")
-    p.turns = {Vector3d::UnitX(), Vector3d::UnitY(), Vector3d::UnitZ()};
-  const Vector3d f[2] = {vector(n, 2), vector(n, 8)}, m[2] = {vector(n, 5), vector(n, 11)};
-  Vector3d about[2];
-  double arm = 0;
-  for (int k = 0; k < 2; ++k) {
-    about[k] = m[k] + (s[k].x - p.at[0]).cross(f[k]);
-    arm += (s[k].x - p.at[0]).norm();
+  if (couples || (joint.has_laws && (block_->word == "instant" || block_->numbers[1] == 0))) {
+    if (joint.kind == "ball") p.turns = {Vector3d::UnitX(), Vector3d::UnitY()};
+    (joint.kind == "slider" ? p.held : p.turns)
+        .push_back(joint.kind == "ball" ? Vector3d(Vector3d::UnitZ()) : p.z);
   }
+  const Vector3d f[2] = {vector(n, 2), vector(n, 8)}, m[2] = {vector(n, 5), vector(n, 11)};
+  const Vector3d arm[2] = {s[0].x - p.at, s[1].x - p.at};
+  const Vector3d about = m[0] + arm[0].cross(f[0]);
   const double size = f[0].norm() + f[1].norm();
-  const double bound = kHolds * (m[0].norm() + m[1].norm() + size * (arm + 1e-3));
+  const double bound =
+      kHolds * (m[0].norm() + m[1].norm() + size * (arm[0].norm() + arm[1].norm() + 1e-3));
   expect("reaction", (f[0] + f[1]).norm(), kRounding * size, joint.name);
-  expect("moment of reaction", (about[0] + about[1]).norm(), bound, joint.name);
+  expect("moment of reaction", (about + m[1] + arm[1].cross(f[1])).norm(), bound, joint.name);
   const auto rest = [](Vector3d total, const std::vector<Vector3d>& along) {
     for (const Vector3d& u : along) total -= total.dot(u) / std::max(u.squaredNorm(), 1e-300) * u;
     return total.norm();
   };
   expect("force of the joint's kind", rest(f[0], p.held), bound + 1e-12, joint.name);
-  expect("moment of the joint's kind", rest(about[0], p.turns), bound + 1e-12, joint.name);
+  expect("moment of the joint's kind", rest(about, p.turns), bound + 1e-12, joint.name);
 }
 
-void Judge::load_contact(const JudgedContact& c, Loads& loads) {
-  for (const auto& [number, sign] : {std::pair(c.first, 1.0), std::pair(c.second, -1.0)}) {
-    const auto load = loads.find(number);
-    if (load == loads.end()) continue;
-    const Vector3d arm = c.on(number) - state(number).x;
-    load->second.add(sign * c.x, sign * (c.moment + arm.cross(c.x)));
+void Judge::push_by_contacts(Loads& loads) {
+  each("contact", [&](const auto& n, const auto&) {
+    const JudgedContact c(n);
+    for (int k = 0; k < 2; ++k) {
+      const auto load = loads.find(c.body[k]);
+      if (load == loads.end()) continue;
+      const Vector3d x = k == 0 ? c.x : -c.x, moment = k == 0 ? c.moment : -c.moment;
+      load->second.add(x, moment + (c.on[k] - state(c.body[k]).x).cross(x));
+    }
+  });
+}
+
+// Returns the natural residual; `speed`: the largest so far, which it is a part of. At an instant
+// all motions are one. A sub-step obeys its laws in its middle, which is this far from its start:
+// bodies turn, their normal does along an edge, and points move in their face, or along a curve:
+// an ellipsoid's radius is at most a^2 / height, and a^2 5/2 of trace / mass; twice that, as mass
+// may lie inside.
+double Judge::contact(const JudgedContact& c, double dt, const States& came, const States& free,
+                      const States& mid, double& speed) {
+  const std::string what = name_of(c);
+  const auto [law, pair] = friction(c);
+  double inverse = 0, turning = 0, fast = 0, round = INFINITY, flat = 0, patch = 0;
+  Vector3d before = Vector3d::Zero(), comes = before, w = before, belts = before;
+  for (int k = 0; k < 2; ++k) {
+    const double number = c.body[k], sign = k == 0 ? 1 : -1;
+    const JudgedBody& b = body(number);
+    const Vector3d r = c.on[k] - state(number).x;
+    const Told &start = came.at(number), &coming = free.at(number), &end = mid.at(number);
+    const auto add = [&](Vector3d& out, const Told& s) { out += sign * (s.v + s.w.cross(r)); };
+    add(before, start), add(comes, coming), add(w, end);
+    belts += sign * b.belt_at(r);
+    turning += start.w.norm() + end.w.norm();
+    fast += start.v.norm() + end.v.norm() + coming.v.norm() + end.w.norm() * r.norm();
+    if (!(b.mass > 0)) continue;
+    inverse += 1 / b.mass;
+    round = std::min(round, r.norm());
+    flat = std::max(flat, 5 * b.inertia.trace() / b.mass / std::max(std::abs(r.dot(c.n)), 1e-300));
   }
+  each("contact", [&](const auto& n, const auto&) {
+    if (n[0] == c.body[0] && n[1] == c.body[1])
+      patch = std::max(patch, (vector(n, 2) - c.on[0]).norm());
+  });
+  const double spins = (free.at(c.body[0]).w - free.at(c.body[1]).w).norm();
+  const double most = std::max(before.norm(), comes.norm());
+  const double middle =
+      dt * (turning * fast + spins * spins * flat + most * most / std::max(round, 1e-300)) +
+      spins * patch + kRounding * (1 + fast);
+  const double push = c.x.dot(c.n), spin = c.moment.dot(c.n), size = c.x.norm();
+  expect("points of contact", (c.on[0] - c.on[1]).norm(),
+         std::abs(c.gap) * (1 + kLaw) + kRounding * (1 + c.on[0].norm()), what);
+  expect("unit normal", std::abs(c.n.norm() - 1), kRounding, what);
+  expect("moments of friction",
+         std::max(std::abs(spin) - pair.torsional * push,
+                  (c.moment - spin * c.n).norm() - pair.rolling * push),
+         kBalance * push + kRounding, what);
+  expect("surface speed", (c.slip - belts + belts.dot(c.n) * c.n).norm(), middle, what);
+  const double off = natural_residual(law, c.n, inverse * c.x, w + c.slip + c.bias * c.n);
+  if (block_->word == "instant") {
+    expect("contact closed", std::abs(c.gap), kInstant, what);
+    expect("law of contact", off, kInstant * (1 + fast) + kBalance * size * inverse, what);
+    return off;
+  }
+  const double tiny = kBalance * size + (inverse > 0 ? kRounding * most / inverse : 0);
+  expect("contacts push", -push, tiny, what);
+  expect("Coulomb's cone", (c.x - push * c.n).norm(), std::max(law.along, law.across) * push + tiny,
+         what);
+  speed = std::max(speed, before.norm() + comes.norm() + c.slip.norm() + std::abs(c.bias) +
+                              size * inverse + gravity_.norm() * dt);
+  const double approach = -before.dot(c.n), approaches = -comes.dot(c.n);
+  double wrong = std::abs(c.bias - (dt > 0 ? std::max(c.gap, 0.0) / dt : 0));
+  if (approaches * dt > c.gap || dt == 0)
+    wrong = std::min({wrong, std::abs(c.bias),
+                      std::abs(c.bias + pair.restitution * std::min(approach, approaches))});
+  if (block_->numbers[2] == 0) expect("restitution, or gap that closes", wrong, middle, what);
+  return off;
 }
 
 std::pair<Friction, JudgedPair> Judge::friction(const JudgedContact& c) {
-  for (const auto& [first, second] : {std::pair(c.first, c.second), std::pair(c.second, c.first)}) {
+  for (const auto& [first, second] :
+       {std::pair(c.body[0], c.body[1]), std::pair(c.body[1], c.body[0])}) {
     const auto found = pairs_.find({body(first).material, body(second).material});
     if (found == pairs_.end()) continue;
     const JudgedPair& pair = found->second;
@@ -274,14 +329,6 @@ std::pair<Friction, JudgedPair> Judge::friction(const JudgedContact& c) {
     return {out, pair};
   }
   throw Damaged(name_of(c) + ": bodies of no pair touch");
-}
-
-void Judge::moments(const JudgedContact& c, const JudgedPair& pair, const std::string& what) {
-  const double push = c.x.dot(c.n), spin = c.moment.dot(c.n);
-  expect("moments of friction",
-         std::max(std::abs(spin) - pair.torsional * push,
-                  (c.moment - spin * c.n).norm() - pair.rolling * push),
-         kBalance * push + kRounding, what);
 }
 
 Verdict judge(const std::string& file) {

@@ -17,22 +17,30 @@ struct Told {
   Quaterniond q = Quaterniond::Identity();
 };
 
+inline Vector3d vector(const std::vector<double>& n, std::size_t k) {
+  return {n[k], n[k + 1], n[k + 2]};
+}
+inline Quaterniond quaternion(const std::vector<double>& n, std::size_t k) {
+  return {n[k], n[k + 1], n[k + 2], n[k + 3]};
+}
+inline Quaterniond rotation(const Vector3d& v) {
+  const double a = v.norm(), s = a > 0 ? std::sin(a / 2) / a : 0.5;
+  return {std::cos(a / 2), s * v.x(), s * v.y(), s * v.z()};
+}
+
 /// A joint by its points and frames on both bodies alone. It holds directions of the second
 /// body's frame in which points, and turns, do not move against each other.
 class JudgedJoint {
  public:
   explicit JudgedJoint(const Record& line) : name(line.text) {
     const std::vector<double>& n = line.numbers;
-    const auto vector = [&](std::size_t k) { return Vector3d(n[k], n[k + 1], n[k + 2]); };
-    const auto turn = [&](std::size_t k) {
-      return Quaterniond(n[k], n[k + 1], n[k + 2], n[k + 3]);
-    };
     kind = name.substr(0, name.find(' '));
     name.erase(0, std::min(name.size(), kind.size() + 1));
     body[0] = n[1], body[1] = n[2];
-    point_[0] = vector(3), frame_[0] = turn(6), point_[1] = vector(10), frame_[1] = turn(13);
+    point_[0] = vector(n, 3), frame_[0] = quaternion(n, 6);
+    point_[1] = vector(n, 10), frame_[1] = quaternion(n, 13);
     length_ = n[17], driven = n[18] == 1, has_laws = n[18] == 2;
-    for (int k = 0; k < 4; ++k) motion_[k] = n[19 + static_cast<std::size_t>(k)];
+    std::copy_n(n.begin() + 19, 4, motion_);
     static const std::map<std::string, std::pair<const char*, const char*>> kHeld = {
         {"ball", {"xyz", ""}},     {"hinge", {"xyz", "xy"}}, {"slider", {"xy", "xyz"}},
         {"fixed", {"xyz", "xyz"}}, {"planar", {"z", "xy"}},  {"universal", {"xyz", "u"}},
@@ -40,27 +48,27 @@ class JudgedJoint {
     const auto found = kHeld.find(kind);
     if (found == kHeld.end()) throw Damaged("joint of a kind \"" + kind + "\"");
     held_ = found->second.first, turns_ = found->second.second;
+    if (driven && kind == "slider") held_ += 'z';
+    if (driven && kind == "hinge") turns_ += 'z';
   }
 
-  /// Its bodies as they are: frames, points, arms, and directions.
+  /// Its bodies as they are.
   struct Place {
-    Quaterniond g[2];
-    Vector3d at[2], arm[2];
-    std::vector<Vector3d> held, turns;
-    Vector3d z, d;  ///< the free direction; between the points
+    Vector3d at, d;                     ///< the point on the first; from that on the second to it
+    Quaterniond turn;                   ///< of the first frame in the second
+    std::vector<Vector3d> held, turns;  ///< directions
+    Vector3d z;                         ///< of laws
   };
   Place place(const Told (&s)[2]) const {
+    const Quaterniond first = s[0].q * frame_[0], second = s[1].q * frame_[1];
     Place p;
-    for (int k = 0; k < 2; ++k) {
-      p.arm[k] = s[k].q * point_[k];
-      p.at[k] = s[k].x + p.arm[k];
-      p.g[k] = s[k].q * frame_[k];
-    }
-    p.d = p.at[0] - p.at[1];
+    p.at = s[0].x + s[0].q * point_[0];
+    p.d = p.at - s[1].x - s[1].q * point_[1];
+    p.turn = second.conjugate() * first;
     const auto direction = [&](char c) -> Vector3d {
       if (c == 'd') return p.d / std::max(p.d.norm(), 1e-300);
-      if (c == 'u') return (p.g[0] * Vector3d::UnitZ()).cross(p.g[1] * Vector3d::UnitX());
-      return p.g[1] * Vector3d::Unit(c - 'x');
+      if (c == 'u') return (first * Vector3d::UnitZ()).cross(second * Vector3d::UnitX());
+      return second * Vector3d::Unit(c - 'x');
     };
     for (const char c : held_) p.held.push_back(direction(c));
     for (const char c : turns_) p.turns.push_back(direction(c));
@@ -68,78 +76,55 @@ class JudgedJoint {
     return p;
   }
 
-  /// Prescribed way at a time, or its first or second derivative.
-  double way(double t, int order) const {
-    if (!driven) return 0;
-    const auto [rate, amplitude, frequency, phase] = motion_;
-    const double w = 2 * linalg::kPi * frequency;
-    if (order == 0) return rate * t + amplitude * (std::sin(w * t + phase) - std::sin(phase));
-    if (order == 1) return rate + amplitude * w * std::cos(w * t + phase);
-    return -amplitude * w * w * std::sin(w * t + phase);
-  }
-
-  /// Largest errors: of places (m, rad), and of speeds.
-  std::pair<double, double> errors(const Told (&s)[2], double t) const {
-    const Place p = place(s);
-    double off = 0, fast = 0;
-    const auto is_off = [&](double e) { off = std::max(off, std::abs(e)); };
-    const auto is_fast = [&](double e) { fast = std::max(fast, std::abs(e)); };
-    const Vector3d u =
-        s[0].v + s[0].w.cross(p.arm[0]) - s[1].v - s[1].w.cross(p.arm[1]) - s[1].w.cross(p.d);
-    const Vector3d w = s[0].w - s[1].w;
-    if (kind == "distance")
-      return {std::abs(p.d.norm() - length_ - way(t, 0)), std::abs(p.held[0].dot(u) - way(t, 1))};
-    for (const Vector3d& k : p.held) is_off(k.dot(p.d)), is_fast(k.dot(u));
-    for (const Vector3d& k : p.turns) is_fast(k.dot(w));
-    if (kind == "slider" && driven)
-      is_off(p.z.dot(p.d) - way(t, 0)), is_fast(p.z.dot(u) - way(t, 1));
-    Quaterniond q = p.g[1].conjugate() * p.g[0];
-    if (kind == "hinge" && driven) {
-      q = Eigen::AngleAxisd(-way(t, 0), Vector3d::UnitZ()) * q;
-      is_off(2 * q.z());
-      is_fast(p.z.dot(w) - way(t, 1));
+  /// Errors of places (m, rad), and of the speeds of points and of turns.
+  struct Errors {
+    std::vector<double> off, slips, spins;
+  };
+  Errors errors(const Told (&s)[2], double t) const {
+    Place p = place(s);
+    const Vector3d u = s[0].v + s[0].w.cross(p.at - s[0].x) - s[1].v - s[1].w.cross(p.at - s[1].x);
+    Errors e;
+    for (const Vector3d& k : p.held) e.off.push_back(k.dot(p.d)), e.slips.push_back(k.dot(u));
+    for (const Vector3d& k : p.turns) e.spins.push_back(k.dot(s[0].w - s[1].w));
+    if (kind == "distance") e.off[0] -= length_;
+    if (driven) {
+      const auto [rate, amplitude, frequency, phase] = motion_;
+      const double w = 2 * linalg::kPi * frequency;
+      const double way = rate * t + amplitude * (std::sin(w * t + phase) - std::sin(phase));
+      const double fast = rate + amplitude * w * std::cos(w * t + phase);
+      if (kind == "hinge") {
+        p.turn = rotation({0, 0, -way}) * p.turn, e.spins.back() -= fast;
+      } else {
+        e.off.back() -= way, e.slips.back() -= fast;
+      }
     }
-    const Vector3d z = q * Vector3d::UnitZ();
-    if (kind == "hinge" || kind == "planar") is_off(z.x()), is_off(z.y());
-    if (kind == "slider" || kind == "fixed") is_off(2 * q.vec().norm());
-    if (kind == "universal") is_off(z.x());
-    return {off, fast};
+    const Vector3d z = p.turn * Vector3d::UnitZ(), twice = 2 * p.turn.vec();
+    if (turns_ == "u") e.off.push_back(z.x());
+    if (turns_ == "xy") e.off.insert(e.off.end(), {z.x(), z.y()});
+    if (turns_ == "xyz") e.off.insert(e.off.end(), {twice.x(), twice.y(), twice.z()});
+    return e;
   }
 
-  /// Largest errors of the accelerations (m/s^2, rad/s^2) of places and turns.
+  /// Rates of the errors of speeds, largest of points and of turns: by differences over 2 h.
   std::pair<double, double> accelerations(const Told (&s)[2], const Vector3d (&a)[2],
                                           const Vector3d (&alpha)[2], double t) const {
-    const Place p = place(s);
-    const auto grown = [&](int k, const Vector3d& r) -> Vector3d {
-      return alpha[k].cross(r) + s[k].w.cross(s[k].w.cross(r));
-    };
-    const Vector3d d1 = s[0].v + s[0].w.cross(p.arm[0]) - s[1].v - s[1].w.cross(p.arm[1]);
-    const Vector3d d2 = a[0] + grown(0, p.arm[0]) - a[1] - grown(1, p.arm[1]);
-    if (kind == "distance") {
-      const double along = p.held[0].dot(d1);
-      return {
-          std::abs(p.held[0].dot(d2) +
-                   (d1.squaredNorm() - along * along) / std::max(p.d.norm(), 1e-300) - way(t, 2)),
-          0};
-    }
-    const auto second = [&](const Vector3d& k) {
-      return k.dot(d2) + 2 * s[1].w.cross(k).dot(d1) + grown(1, k).dot(p.d);
-    };
-    double off = 0, bad = 0;
-    for (const Vector3d& k : p.held) off = std::max(off, std::abs(second(k)));
-    if (kind == "slider" && driven) off = std::max(off, std::abs(second(p.z) - way(t, 2)));
-    const Vector3d w = s[0].w - s[1].w, more = alpha[0] - alpha[1];
-    for (const Vector3d& k : p.turns) {
-      Vector3d rate = s[1].w.cross(k);
-      if (kind == "universal") {
-        const Vector3d z = p.g[0] * Vector3d::UnitZ(), x = p.g[1] * Vector3d::UnitX();
-        rate = s[0].w.cross(z).cross(x) + z.cross(s[1].w.cross(x));
+    const double fast = std::max(s[0].w.norm(), s[1].w.norm());
+    const double h = 1e-3 / (1 + fast + 2 * linalg::kPi * std::abs(motion_[2]));
+    const auto after = [&](double k) {
+      Told moved[2];
+      for (int i = 0; i < 2; ++i) {
+        moved[i].x = s[i].x + k * s[i].v, moved[i].q = rotation(k * s[i].w) * s[i].q;
+        moved[i].v = s[i].v + k * a[i], moved[i].w = s[i].w + k * alpha[i];
       }
-      bad = std::max(bad, std::abs(k.dot(more) + rate.dot(w)));
-    }
-    if (kind == "hinge" && driven)
-      bad = std::max(bad, std::abs(p.z.dot(more) + s[1].w.cross(p.z).dot(w) - way(t, 2)));
-    return {off, bad};
+      return errors(moved, t + k);
+    };
+    const Errors ahead = after(h), behind = after(-h);
+    const auto rate = [&](const std::vector<double>& x, const std::vector<double>& y) {
+      double most = 0;
+      for (std::size_t k = 0; k < x.size(); ++k) most = std::max(most, std::abs(x[k] - y[k]));
+      return most / (2 * h);
+    };
+    return {rate(ahead.slips, behind.slips), rate(ahead.spins, behind.spins)};
   }
 
   double arms() const { return point_[0].norm() + point_[1].norm(); }

@@ -7,6 +7,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <map>
@@ -35,16 +36,6 @@ inline constexpr double kInstant = 1e-4;    // of accelerations and speeds of sm
 inline constexpr double kLeads = 1e-5;      // of momenta and places from one instant to the next
 inline constexpr std::size_t kTold = 10;    // faults
 
-inline Vector3d vector(const std::vector<double>& n, std::size_t k) {
-  return {n[k], n[k + 1], n[k + 2]};
-}
-inline Quaterniond quaternion(const std::vector<double>& n, std::size_t k) {
-  return {n[k], n[k + 1], n[k + 2], n[k + 3]};
-}
-inline Quaterniond rotation(const Vector3d& v) {
-  const double a = v.norm(), s = a > 0 ? std::sin(a / 2) / a : 0.5;
-  return {std::cos(a / 2), s * v.x(), s * v.y(), s * v.z()};
-}
 inline double apart(const Quaterniond& p, const Quaterniond& q) {
   return 2 * std::min((p.coeffs() - q.coeffs()).norm(), (p.coeffs() + q.coeffs()).norm());
 }
@@ -86,9 +77,14 @@ struct JudgedBody {
   Vector3d unspin(const Quaterniond& q, const Vector3d& momentum) const {
     return q * (inertia.inverse() * (q.conjugate() * momentum));
   }
-  /// Velocity of the surface against the body at a point.
-  Vector3d belt_at(const Vector3d& p) const {
-    return state->q * (belt + belt_turn.cross(state->q.conjugate() * (p - state->x)));
+  Told struck(const Load& load) const {
+    Told s = *state;
+    s.v += load.force / mass, s.w += unspin(s.q, load.torque);
+    return s;
+  }
+  /// Velocity of the surface against the body at a place from its centre.
+  Vector3d belt_at(const Vector3d& r) const {
+    return state->q * (belt + belt_turn.cross(state->q.conjugate() * r));
   }
 };
 
@@ -98,28 +94,31 @@ struct JudgedPair {
 
 struct JudgedContact {
   explicit JudgedContact(const std::vector<double>& m)
-      : first(m[0]),
-        second(m[1]),
-        on_first(vector(m, 2)),
-        on_second(vector(m, 5)),
+      : body{m[0], m[1]},
+        on{vector(m, 2), vector(m, 5)},
         n(vector(m, 8)),
         gap(m[11]),
         bias(m[12]),
         slip(vector(m, 13)),
         x(vector(m, 16)),
         moment(vector(m, 19)) {}
-  const Vector3d& on(double body) const { return body == first ? on_first : on_second; }
-  double first, second;
-  Vector3d on_first, on_second, n;
+  double body[2];
+  Vector3d on[2], n;
   double gap, bias;
   Vector3d slip, x, moment;
 };
 
-/// Bodies at an instant with their accelerations, moments of forces and angular momenta.
+/// A quantity of a body at an instant, its rate, and its size where it is small.
+struct Led {
+  Vector3d value, rate;
+  double tiny;
+};
+
+/// Bodies at an instant: momentum, angular momentum, place, turn; orientation.
 struct Instant {
   struct One {
-    Told s;
-    Vector3d a, alpha, torque, spin;
+    std::array<Led, 4> led;
+    Quaterniond q;
   };
   double time = 0, events = 0;
   std::map<double, One> bodies;
@@ -145,24 +144,23 @@ class Judge {
     for (const Record& line : lines_)
       if (line.word == word) f(line.numbers, line.text);
   }
+  States told_states() const;
 
-  void rests(JudgedBody& b, const Told& s);
   void judge_block();
   void part(const States& to);
   void push(double factor, const States& to, Loads& loads);
   void pull(const States& to, Loads& loads, Loads& late);
   void pull_of(const JudgedJoint& joint, const std::vector<double>& n, bool couples,
                const Told (&s)[2]);
-  void load_contact(const JudgedContact& c, Loads& loads);
-  void contacts(double dt, const States& free, const States& mid);
-  double contact(const JudgedContact& c, double patch, double dt, const States& free,
+  void push_by_contacts(Loads& loads);
+  void contacts(double dt, const States& came, const States& free, const States& mid);
+  double contact(const JudgedContact& c, double dt, const States& came, const States& free,
                  const States& mid, double& speed);
-  void moments(const JudgedContact& c, const JudgedPair& pair, const std::string& what);
   std::pair<Friction, JudgedPair> friction(const JudgedContact& c);
   std::string name_of(const JudgedContact& c) {
-    return body(c.first).name + " on " + body(c.second).name;
+    return body(c.body[0]).name + " on " + body(c.body[1]).name;
   }
-  void laws(double dt, const States& mid);
+  void law_of_joint(const std::vector<double>& n, double dt, const States& came, const States& mid);
   void moves(const JudgedBody& b, double dt, const Load& load, const Load& late, const Told& placed,
              const Told& end);
   void turns(const JudgedBody& b, double dt, const Load& load, const Load& late, const Told& placed,
@@ -171,16 +169,14 @@ class Judge {
   void hold(const States& to);
   void follows(const States& to);
   void instant(const States& to);
-  void touch(const JudgedContact& c);
-  void accelerates(const JudgedBody& b, Instant::One& one, const Vector3d& a, const Vector3d& alpha,
-                   const Load& load);
-  void leads(double number, const Instant::One& from, const Instant::One& to);
+  void accelerates(const JudgedJoint& joint, const States& rates);
+  void leads(double number);
 
   Verdict verdict_;
   std::map<double, JudgedBody> bodies_;
   std::map<std::pair<int, int>, JudgedPair> pairs_;
   std::map<double, JudgedJoint> joints_;
-  std::vector<std::pair<double, double>> coupled_;  // coupling, joint
+  std::map<double, double> reacts_;  // joints, and behind them those of couplings
   Vector3d gravity_ = Vector3d::Zero();
   bool keeps_momentum_ = true, associated_ = false, frictionless_ = false, moved_ = false;
   double step_ = 0, when_ = 0, claimed_ = 0;
