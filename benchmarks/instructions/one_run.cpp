@@ -13,6 +13,8 @@
 #include <problems/lotka_volterra.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/rigid_body.hpp>
+#include <problems/robertson.hpp>
+#include <problems/two_bit_adder.hpp>
 
 #include "projection/run.hpp"
 
@@ -27,6 +29,8 @@ problems::Problem problem_of(const std::string& name, const std::string& form) {
   if (name == "car axis") return car_axis(form);
   if (name == "akzo nobel") return akzo_nobel();
   if (name == "rigid body") return rigid_body("dzhanibekov", 100.0);
+  if (name == "robertson") return robertson(4e5, form);
+  if (name == "two-bit adder") return two_bit_adder();
   if (name == "lotka volterra") return lotka_volterra(2, 0.5, 100);
   throw std::invalid_argument("one_run: no problem is called " + name);
 }

@@ -19,8 +19,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kNoArea = 1e-14;  // least ratio of twice the area to the longest edge squared
-constexpr double kFlat = 1e-9;     // radian: smaller bends between triangles are rounding
 constexpr std::size_t kMostTriangles = 20000;
 
 std::string listed(const std::array<int, 3>& t) {

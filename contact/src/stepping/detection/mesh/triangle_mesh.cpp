@@ -15,9 +15,7 @@ using linalg::at;
 
 namespace {
 
-constexpr double kFlat = 1e-9;     // radian: smaller bends between triangles are rounding
-constexpr double kNoArea = 1e-14;  // least ratio of twice the area to the longest edge squared
-constexpr double kBelow = 1e-7;    // radian: neighbours of a top may rise by this angle
+constexpr double kBelow = 1e-7;  // radian: neighbours of a top may rise by this angle
 
 struct HalfEdge {
   int low, high;  // corners

@@ -7,6 +7,9 @@
 
 namespace tether::contact::detail {
 
+constexpr double kFlat = 1e-9;     // radian: smaller bends between triangles are rounding
+constexpr double kNoArea = 1e-14;  // least ratio of twice the area to the longest edge squared
+
 /// Joins points that are equal to the last bit: the index of each in `different`.
 std::vector<int> welded(const std::vector<Eigen::Vector3d>& points,
                         std::vector<Eigen::Vector3d>& different);
