@@ -4,9 +4,10 @@
     python3 docs/words.py FILE_OR_FOLDER...
 
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
-section or equation of a method that its paper lacks, no phrase that the glossary replaces, no
-document above its length. Sources (a folder: all below it), scripts, scenes and programs in documents: no comment line that begins with Of, What or Where. Sources: no such phrase in a comment, and sections and
-equations of a method that its paper has; in public headers no sentence above 35 words.
+section or equation of a method that its paper lacks, no phrase that the glossary replaces, no document above its
+length. Sources (a folder: all below it), scripts, scenes and programs in documents: no comment line that begins with
+Of, What or Where. Sources: no such phrase in a comment, and sections and equations of a method that its paper has; in
+public headers no sentence above 35 words.
 """
 import pathlib
 import re
