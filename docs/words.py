@@ -24,7 +24,7 @@ BLOCK = re.compile(r"^```.*?^```[ \t]*$", re.M | re.S)
 REMARK = re.compile(r"//.*|/\*.*|(?:^|\s)#(?!\s*(?:include|define|undef|if|el|end|pragma|error|warning)).*|^\s*\*.*")
 # The paper that a comment means by "method", by the folder of its source.
 PAPERS = {"linalg": "projection", "ida_projection": "projection", "contact": "contact", "scene": "events"}
-REFERENCE = re.compile(r"\b([Mm]ethod|[Dd]etection), (section|eq)s?[. ]+(\d+(?:\.\d+)?(?:, \d+)*)")
+REFERENCE = re.compile(r"(\b[Mm]ethod|\b[Dd]etection|(?<=docs/method/)\w+)(?:\.md)?, (section|eq)s?[. ]+(\d+(?:\.\d+)?(?:, \d+)*)")
 GUIDE = re.compile(r"(?:\b(\w+)/)?README(?:\.md)?, section (\d+)")
 COMMENT = re.compile(r"^\s*(?://+[!<]*|#|!)\s*(Of|What|Where)\b")
 
@@ -159,9 +159,9 @@ def check_source(path, replaced):
                 yield f"{path}:{number}: say \"{instead}\", not \"{phrase}\""
         more = re.match(r"\s*//+ (.*)", lines[number]) if remark.group().endswith(",") and number < len(lines) else None
         cited = remark.group() + (" " + more.group(1) if more else "")
-        for place, kind, numbers in REFERENCE.findall(cited) if room in PAPERS else ():
-            named = PAPERS[room] if place.lower() == "method" else place.lower()
-            for which in set(numbers.split(", ")) - paper(named)[kind]:
+        for place, kind, numbers in REFERENCE.findall(cited):
+            named = PAPERS.get(room) if place.lower() == "method" else place.lower()
+            for which in set(numbers.split(", ")) - paper(named)[kind] if named else ():
                 yield f"{path}:{number}: docs/method/{named}.md has no {kind} {which}"
         for folder, section in GUIDE.findall(cited):
             guide = ROOT / (folder or room) / "README.md"
