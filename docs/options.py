@@ -4,7 +4,8 @@
     python3 docs/options.py
 
 Each public field of these structures stands in a table of its guide whose first column is "option", with its default,
-and each option of such a table is a field. Tables of docs/scene_fields.md have what scene/src/files reads."""
+and each option of such a table is a field. Tables of docs/scene_fields.md have what scene/src/files reads, that of
+linalg/README.md each header."""
 import pathlib
 import re
 import sys
@@ -69,6 +70,9 @@ def problems():
                     yield f"{guide}: {name} is {known[name]}, not {written}"
         for name in sorted(known.keys() - told):
             yield f"{guide}: no table has {known[name][0][0]}::{name}"
+    linalg = {name for row in tables((ROOT / "linalg" / "README.md").read_text(), "header") for name in re.findall(r"`([\w.]+)`", row[0])}
+    for name in sorted(linalg ^ {p.name for p in (ROOT / "linalg" / "include" / "tether" / "linalg").glob("*.hpp")}):
+        yield f"linalg/README.md: {name} is " + ("no header" if name in linalg else "not told")
     page = (ROOT / "docs" / "scene_fields.md").read_text()
     source = (ROOT / "scene" / "src" / "files" / "read.hpp").read_text()
     parts = "".join(part for part in page.split("\n## ") if re.match(r"\[(?:smooth|stepping|event)\]", part))
