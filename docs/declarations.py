@@ -4,10 +4,14 @@
     python3 docs/declarations.py HEADER
 
 Doxygen gives the comment of `double a, b;  ///< lengths, m` to one of the two: here each has it. Members that only move,
-copy or destroy an object are left out: their declaration says all. Lines keep their numbers."""
+copy or destroy an object are left out: their declaration says all. Lines keep their numbers. A cited section of a method
+links to its paper on the site."""
 import pathlib
 import re
 import sys
+
+sys.dont_write_bytecode = True
+from words import PAPERS, ROOT
 
 DECLARATION = re.compile(r"(\s*)((?:(?:const|static|constexpr|inline) )*[\w:]+(?:<[^;(]*>)?(?:::\w+)*[*&]? )(\w[^;]*);\s*(.*)$")
 DECLARATOR = re.compile(r"\w+(\[\w+\])?\s*(=.*)?$")
@@ -60,5 +64,16 @@ def filtered(lines):
         yield from [""] * blank
 
 
+def linked(line, room):
+    """A cited paper as a link from the reference to its page. Listings, indented by four, have no links."""
+    if "///" not in line or "///     " in line:
+        return line
+    pages = {"method": PAPERS.get(room), "detection": "detection"}
+    return re.sub(r"\b(method|detection)(?=, (?:section|eq)\b)",
+                  lambda m: f"[{m.group()}](../docs/method/{pages[m.group()]}.html)", line)
+
+
 if __name__ == "__main__":
-    print("\n".join(filtered(pathlib.Path(sys.argv[1]).read_text().splitlines())))
+    header = pathlib.Path(sys.argv[1]).resolve()
+    lines = filtered(header.read_text().splitlines())
+    print("\n".join(linked(line, header.relative_to(ROOT).parts[0]) for line in lines))
