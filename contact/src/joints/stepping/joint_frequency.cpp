@@ -16,9 +16,10 @@ namespace {
 
 using linalg::at;
 
-constexpr double kDifference = 1e-5;  // rad, and in parts of the size of what joints hold
-constexpr double kGrows = 1.05;       // w^2 in an iteration: goes on
-constexpr int kMostIterations = 10;   // in a step
+constexpr double kDifference = 1e-5;      // rad, and in parts of the size of what joints hold
+constexpr double kGrows = 1.05;           // w^2 in an iteration: goes on
+constexpr int kMostIterations = 10;       // in a step
+constexpr double kChangeOfEnergy = 0.01;  // of a vibration, by a step whose frequency changes
 
 // Numbers of no pattern that modes could be orthogonal to: multiples of the golden ratio, modulo 1.
 Vector6d any_direction(int body) {
@@ -126,13 +127,18 @@ void JointFrequency::update(const RowsAt& rows_at, const JointRows& rows,
     square = iterate(rows_at, rows, impulses, t, dt, mechanisms, bodies);
     if (!(square > kGrows * last)) break;
   }
-  memory_.frequency = std::sqrt(square);
+  memory_.frequency = at_end_ = std::sqrt(square);
 }
 
 void JointFrequency::follow(double acceleration) {
   if (!(memory_.acceleration > 0)) return;
   memory_.frequency *= std::sqrt(acceleration / memory_.acceleration);
   memory_.acceleration = acceleration;
+}
+
+bool JointFrequency::resolves_change(double dt) const {
+  const double turn = memory_.frequency * dt;
+  return !(turn * turn * std::abs(1 - at_end_ / memory_.frequency) > kChangeOfEnergy);
 }
 
 }  // namespace tether::contact::detail

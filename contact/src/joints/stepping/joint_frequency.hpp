@@ -26,9 +26,15 @@ class JointFrequency {
               double acceleration, double t, double dt, Mechanisms& mechanisms, BodySet& bodies);
   /// By what joints add in the step that begins.
   void follow(double acceleration);
+  /// Whether a step of this length resolves how the frequency has changed since the last one ended:
+  /// an explicit step knows the energy of a vibration up to a part of (w dt)^2.
+  bool resolves_change(double dt) const;
 
   const StepperMemory::Vibration& memory() const { return memory_; }
-  void set_memory(const StepperMemory::Vibration& memory) { memory_ = memory; }
+  void set_memory(const StepperMemory::Vibration& memory) {
+    memory_ = memory;
+    at_end_ = memory.frequency;
+  }
 
  private:
   double iterate(const RowsAt& rows_at, const JointRows& rows, const std::vector<double>& impulses,
@@ -36,6 +42,7 @@ class JointFrequency {
   double displace(const Mechanisms& mechanisms, BodySet& bodies);
 
   StepperMemory::Vibration memory_;
+  double at_end_ = 0;  // of the last step, 1/s
   std::vector<Eigen::Vector3d> position_;
   std::vector<linalg::Quaternion> orientation_;
   std::vector<Vector6d> pull_;

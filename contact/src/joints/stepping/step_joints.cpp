@@ -198,7 +198,7 @@ bool StepJoints::predict(BodySet& bodies, double t, double dt) {
   mechanisms_.satisfy(rows_, v_);
   bend_ = v_;
   store(bodies);
-  const bool met = meet(bodies, t, dt);
+  const bool reached = meet(bodies, t, dt);
   restore(bodies);
   give_velocities(bodies);
   double sum = 0;
@@ -209,6 +209,7 @@ bool StepJoints::predict(BodySet& bodies, double t, double dt) {
            dv.tail<3>().dot(spin(bodies.inertia[at(i)], bodies.orientation[at(i)], dv.tail<3>()));
   }
   frequency_.follow(std::sqrt(sum) / dt);
+  const bool met = reached && frequency_.resolves_change(dt);
   if (!has_laws_) return met;
   laws_.laws.clear();
   equations_->add_laws(bodies, t, laws_.laws);
