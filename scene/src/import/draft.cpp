@@ -269,8 +269,7 @@ class Drafting {
       if (a != named.end() && b != named.end())
         add(a->second, b->second);
       else
-        remarks_.add("<exclude> of the world, or of a body that is not there",
-                     first + " and " + second);
+        remarks_.add("<exclude> of the world, or of a body without mass", first + " and " + second);
     }
     for (std::size_t k = 0; k < parts_.size(); ++k)
       if (parts_[k].parent >= 0)
@@ -467,8 +466,7 @@ void add_closures(const Model& model, const std::vector<Part>& parts,
     const Side second = side_of(each.second, parts, body_of);
     if (!first.found || !second.found || first.body == second.body ||
         (is_held(first.body) && is_held(second.body))) {
-      remarks.add("equalities of bodies that are not there, or do not move against each other",
-                  each.name);
+      remarks.add("equalities of bodies that do not move against each other", each.name);
       continue;
     }
     Joint joint;

@@ -79,8 +79,7 @@ void add_couplings(const Model& model, const std::vector<Part>& parts,
     std::optional<Coupling> coupling =
         coupling_of({{placed.law.name, 1}, {mimic.of, mimic.multiplier}}, coordinates);
     if (!coupling || mimic.of == placed.law.name)
-      return remarks.add("mimic of joints that are not there, or are none of their own here",
-                         placed.law.name);
+      return remarks.add("mimic of joints that are none of their own here", placed.law.name);
     coupling->name = fmt::format("mimic {}", scene.couplings.size() + 1);
     coupling->weights.clear();
     coupling->polynomial = {mimic.multiplier};

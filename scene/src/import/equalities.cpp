@@ -9,11 +9,8 @@ namespace tether::scene::import {
 
 namespace {
 
-LinkJoint* joint_of(Model& model, const std::string& name) {
-  for (Link& link : model.links)
-    for (LinkJoint& joint : link.joints)
-      if (joint.name == name) return &joint;
-  return nullptr;
+void must_exist(bool exists, Tag& tag, const char* key, const char* kind) {
+  if (tag.has(key) && !exists) tag.wrong(key, fmt::format("there is no such {}", kind));
 }
 
 // Softness of the solver, which rows do not have, and classes, which have nothing else here.
@@ -21,9 +18,9 @@ void finish(Tag& tag, Model& model) {
   tag.finish(model.remarks, {"name", "class", "solref", "solimp", "active", "torquescale"});
 }
 
-void read_joints(Tag& tag, const std::string& name, Model& model) {
-  LinkJoint* const first = joint_of(model, tag.text("joint1"));
-  LinkJoint* const second = joint_of(model, tag.text("joint2"));
+void read_joints(Tag& tag, const std::string& name, const Names& names, Model& model) {
+  LinkJoint* const first = names.joint(tag, "joint1");
+  LinkJoint* const second = names.joint(tag, "joint2");
   std::vector<double> a = tag.numbers("polycoef", 1, 5);
   finish(tag, model);
   if (a.empty()) a = {0, 1};
@@ -31,13 +28,14 @@ void read_joints(Tag& tag, const std::string& name, Model& model) {
   if (a[2] != 0 || a[3] != 0 || a[4] != 0)
     return model.remarks.add("equalities of joints by polynomials of degree 2 to 4", name);
   if (first == nullptr || second == nullptr || first == second)
-    return model.remarks.add("equalities of joints that are not there, or of one joint", name);
+    return model.remarks.add("equalities of one joint", name);
   if (first->mimic) return model.remarks.add("second equalities of a joint", name);
   first->mimic = Mimic{second->name, a[1], first->reference + a[0] - a[1] * second->reference};
 }
 
 // The lengths of fixed tendons, y - y0 = a0 + a1 (x - x0), as they start.
-void read_tendons(Tag& tag, const std::string& name, Model& model) {
+void read_tendons(Tag& tag, const std::string& name, const Names& names, Model& model) {
+  for (const char* key : {"tendon1", "tendon2"}) names.tendon(tag, key);
   const auto first = model.tendons.find(tag.text("tendon1")),
              second = model.tendons.find(tag.text("tendon2"));
   const bool has_second = tag.has("tendon2"), none = first == model.tendons.end();
@@ -65,7 +63,8 @@ bool is_said(const std::vector<double>& place) {
          std::any_of(place.begin() + 3, place.end(), [](double x) { return x != 0; });
 }
 
-void read_closure(Tag& tag, bool weld, const std::string& name, Model& model) {
+void read_closure(Tag& tag, bool weld, const std::string& name, const Names& names, Model& model) {
+  for (const char* key : {"body1", "body2"}) names.body(tag, key);
   if (tag.has("site1") || tag.has("site2"))
     return model.remarks.add("equalities between sites", name);
   Closure out;
@@ -88,7 +87,28 @@ void read_closure(Tag& tag, bool weld, const std::string& name, Model& model) {
 
 }  // namespace
 
-bool read_equality(const Node& node, Model& model, Problems& problems) {
+Names::Names(Model& model) : bodies{"world"} {
+  for (Link& link : model.links) {
+    if (!link.scenery) bodies.insert(link.name);
+    for (LinkJoint& joint : link.joints) joints.emplace(joint.name, &joint);
+  }
+}
+
+LinkJoint* Names::joint(Tag& tag, const char* key) const {
+  const auto found = joints.find(tag.text(key));
+  must_exist(found != joints.end(), tag, key, "joint");
+  return found == joints.end() ? nullptr : found->second;
+}
+
+void Names::tendon(Tag& tag, const char* key) const {
+  must_exist(tendons.count(tag.text(key)) > 0, tag, key, "tendon");
+}
+
+void Names::body(Tag& tag, const char* key) const {
+  must_exist(bodies.count(tag.text(key)) > 0, tag, key, "body");
+}
+
+bool read_equality(const Node& node, const Names& names, Model& model, Problems& problems) {
   const bool weld = is(node, "weld"), joints = is(node, "joint"), tendons = is(node, "tendon");
   if (!weld && !joints && !tendons && !is(node, "connect")) return false;
   Tag tag(node, problems);
@@ -97,11 +117,11 @@ bool read_equality(const Node& node, Model& model, Problems& problems) {
   if (!tag.flag("active", true))
     model.remarks.add("equalities that are not active", name);
   else if (joints)
-    read_joints(tag, name, model);
+    read_joints(tag, name, names, model);
   else if (tendons)
-    read_tendons(tag, name, model);
+    read_tendons(tag, name, names, model);
   else
-    read_closure(tag, weld, name, model);
+    read_closure(tag, weld, name, names, model);
   return true;
 }
 

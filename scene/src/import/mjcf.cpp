@@ -4,10 +4,12 @@
 // several moves by them in turn. Things of the world that touch become links of their own.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <tether/linalg/symmetric_eigen.hpp>
 
 #include "bounds.hpp"
+#include "lists.hpp"
 #include "mjcf_actuators.hpp"
 #include "mjcf_geom.hpp"
 
@@ -290,10 +292,12 @@ void balance_inertia(Model& model) {
 }
 
 /// Pairs of bodies that pass through each other, of <contact>.
-void read_excluded(const Node& node, Model& model, Problems& problems) {
+void read_excluded(const Node& node, const Names& names, Model& model, Problems& problems) {
   Tag tag(node, problems);
-  for (const char* key : {"body1", "body2"})
+  for (const char* key : {"body1", "body2"}) {
     if (!tag.has(key)) tag.missing(key, "the name of a body");
+    names.body(tag, key);
+  }
   model.excluded.emplace_back(tag.text("body1"), tag.text("body2"));
   tag.finish(model.remarks, {"name"});
 }
@@ -319,34 +323,29 @@ Model read_mjcf(const Node& root, Problems& problems) {
   const Settings settings = mjcf::read_settings(root, model, problems);
   Reader reader(model, settings, problems);
   bool has_world = false;
-  mjcf::read_tendons(root, settings, model, problems);
-  std::set<std::string> actuators;
-  std::vector<const Node*> equalities;
-  for (const Node* each = root.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
-    if (is(*each, "worldbody")) {
-      has_world = true;
-      reader.world(*each);
-    } else if (!is(*each, "compiler") && !is(*each, "option") && !is(*each, "default") &&
-               !is(*each, "tendon")) {
-      for (const Node* part = each->FirstChildElement(); part != nullptr;
-           part = part->NextSiblingElement())
-        if (is(*each, "contact") && is(*part, "exclude"))
-          read_excluded(*part, model, problems);
-        else if (is(*each, "actuator"))
-          mjcf::read_actuator(*part, settings, actuators, model, problems);
-        else if (is(*each, "equality"))
-          equalities.push_back(part);
-        else
-          model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
-                            part->Attribute("name") != nullptr ? name_or_line(*part) : "");
-    }
+  for (const Node* each = root.FirstChildElement("worldbody"); each != nullptr;
+       each = each->NextSiblingElement("worldbody")) {
+    has_world = true;
+    reader.world(*each);
   }
-  for (const Node* each : equalities)
-    if (!read_equality(*each, model, problems))
-      model.remarks.add(fmt::format("<{}> in <equality>", each->Name()),
-                        each->Attribute("name") != nullptr ? name_or_line(*each) : "");
   if (!has_world) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");
+  Names names(model);
+  mjcf::read_tendons(root, settings, names, model, problems);
+  const auto is_read = [](const Node& section) {
+    return any_of(std::array{"compiler", "option", "default", "tendon", "worldbody"},
+                  [&](const char* name) { return is(section, name); });
+  };
+  for (const Node* each = root.FirstChildElement(); each != nullptr;
+       each = each->NextSiblingElement())
+    for (const Node* part = is_read(*each) ? nullptr : each->FirstChildElement(); part != nullptr;
+         part = part->NextSiblingElement())
+      if (is(*each, "contact") && is(*part, "exclude"))
+        read_excluded(*part, names, model, problems);
+      else if (is(*each, "actuator"))
+        mjcf::read_actuator(*part, settings, names, model, problems);
+      else if (!is(*each, "equality") || !read_equality(*part, names, model, problems))
+        model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
+                          part->Attribute("name") != nullptr ? name_or_line(*part) : "");
   if (settings.balance_inertia && problems.clean()) balance_inertia(model);
   set_total_mass(settings.total_mass, model);
   return model;

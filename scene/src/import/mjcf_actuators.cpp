@@ -81,17 +81,19 @@ std::optional<std::pair<double, double>> read_range(Tag& tag, const char* key, c
 }
 
 /// The joints that it pulls; none: it pulls something else.
-std::vector<Transmission> read_transmission(Tag& tag, const Model& model) {
+std::vector<Transmission> read_transmission(Tag& tag, const Names& names, const Model& model) {
   const std::vector<double> gear = tag.numbers("gear", 1, 6);
   const double ratio = gear.empty() ? 1 : gear[0];
   std::vector<Transmission> out;
-  if (tag.has("joint") || tag.has("jointinparent")) {
-    out.push_back({tag.text("joint", tag.text("jointinparent")), ratio});
-  } else if (const auto found = model.tendons.find(tag.text("tendon"));
-             found != model.tendons.end()) {
-    out = found->second;
-    for (Transmission& each : out) each.ratio *= ratio;
+  for (const char* key : {"joint", "jointinparent"}) {
+    names.joint(tag, key);
+    if (out.empty() && tag.has(key)) out.push_back({tag.text(key), ratio});
   }
+  names.tendon(tag, "tendon");
+  const auto found = model.tendons.find(tag.text("tendon"));
+  if (!out.empty() || found == model.tendons.end()) return out;
+  out = found->second;
+  for (Transmission& each : out) each.ratio *= ratio;
   return out;
 }
 
@@ -104,8 +106,8 @@ void take_name(const Node& node, std::set<std::string>& names, Problems& problem
 
 }  // namespace
 
-void read_tendons(const Node& root, const Settings& settings, Model& model, Problems& problems) {
-  std::set<std::string> names;
+void read_tendons(const Node& root, const Settings& settings, Names& names, Model& model,
+                  Problems& problems) {
   for (const Node* section = root.FirstChildElement("tendon"); section != nullptr;
        section = section->NextSiblingElement("tendon"))
     for (const Node* each = section->FirstChildElement(); each != nullptr;
@@ -113,7 +115,7 @@ void read_tendons(const Node& root, const Settings& settings, Model& model, Prob
       Tag own(*each, problems);
       Tag tag(*each, problems, settings.defaults(*each, own.text("class"), problems, "tendon"));
       const std::string name = name_or_line(*each);
-      take_name(*each, names, problems);
+      take_name(*each, names.tendons, problems);
       bool acts = tag.text("limited", "auto") != "false" && tag.has("range");
       for (const char* key : {"stiffness", "damping", "frictionloss", "armature"})
         acts = tag.number(key, 0) != 0 || acts;
@@ -124,14 +126,15 @@ void read_tendons(const Node& root, const Settings& settings, Model& model, Prob
       for (const Node* part = each->FirstChildElement("joint"); part != nullptr;
            part = part->NextSiblingElement("joint")) {
         Tag of(*part, problems);
+        names.joint(of, "joint");
         model.tendons[name].push_back({of.text("joint"), of.number("coef", 1)});
       }
     }
 }
 
-void read_actuator(const Node& node, const Settings& settings, std::set<std::string>& names,
-                   Model& model, Problems& problems) {
-  take_name(node, names, problems);
+void read_actuator(const Node& node, const Settings& settings, Names& names, Model& model,
+                   Problems& problems) {
+  take_name(node, names.actuators, problems);
   const std::string kind = node.Name();
   Tag own(node, problems);
   const std::string of_class = own.text("class");
@@ -148,7 +151,7 @@ void read_actuator(const Node& node, const Settings& settings, std::set<std::str
     return model.remarks.add(fmt::format("actuators of kind {}", kind), out.name);
   out.control = read_range(tag, "ctrlrange", "ctrllimited", settings);
   out.force = read_range(tag, "forcerange", "forcelimited", settings);
-  out.to = read_transmission(tag, model);
+  out.to = read_transmission(tag, names, model);
   tag.finish(model.remarks, {"name", "class", "group", "user", "tendon", "gaintype", "biastype",
                              "gainprm", "biasprm", "dynprm", "lengthrange"});
   model.drives.push_back(std::move(out));

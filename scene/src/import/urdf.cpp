@@ -63,6 +63,11 @@ Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joint
     carrier = &joint;
     out.children[static_cast<std::size_t>(parent->second)].push_back(child->second);
   }
+  for (const UrdfJoint& joint : joints)
+    for (const LinkJoint& law : joint.joints)
+      if (law.mimic && names.count(law.mimic->of) == 0)
+        problems.add(joint.line, fmt::format("joint \"{}\": mimic: joint", joint.name),
+                     fmt::format("\"{}\"", law.mimic->of), "there is no such joint");
   return out;
 }
 

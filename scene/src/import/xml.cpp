@@ -70,8 +70,7 @@ std::size_t crowded(std::string_view text) {
       continue;
     }
     char quote = 0;
-    int count = 0;
-    std::size_t k = at + 1;
+    std::size_t count = 0, k = at + 1;
     for (; k < text.size() && (quote != 0 || text[k] != '>'); ++k) {
       if (quote != 0) {
         if (text[k] == quote) quote = 0;

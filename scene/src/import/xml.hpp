@@ -107,8 +107,19 @@ Model read_urdf(const Node& root, Problems& problems);
 /// `root`: <mujoco>. Problems are reported; the model is of use where there are none.
 Model read_mjcf(const Node& root, Problems& problems);
 
+/// Names that an MJCF file gives, by kind. An attribute that names nothing of its kind is wrong.
+struct Names {
+  explicit Names(Model& model);
+  LinkJoint* joint(Tag& tag, const char* key) const;  ///< null: there is none
+  void tendon(Tag& tag, const char* key) const;
+  void body(Tag& tag, const char* key) const;
+
+  std::map<std::string, LinkJoint*> joints;
+  std::set<std::string> bodies, tendons, actuators;
+};
+
 /// Reads an element below <equality> of MJCF: connect and weld become closures, joint becomes a
 /// mimic, tendon a kept sum. False: it is none of them. After all joints and tendons.
-bool read_equality(const Node& node, Model& model, Problems& problems);
+bool read_equality(const Node& node, const Names& names, Model& model, Problems& problems);
 
 }  // namespace tether::scene::import

@@ -352,8 +352,8 @@ TEST_CASE("MJCF: loops close by connect and weld, and joints follow each other b
   CHECK(follows.couplings[0].polynomial == std::vector<double>{2});
 
   CHECK(said(with("<joint joint1='jc' joint2='ja' polycoef='0 1 1 0 0'/>"), "degree 2 to 4"));
-  CHECK(said(with("<joint joint1='jc'/>"), "not there, or of one joint"));
-  CHECK(said(with("<connect name='x' body1='none' anchor='0 0 0'/>"),
+  CHECK(said(with("<joint joint1='jc'/>"), "equalities of one joint"));
+  CHECK(said(with("<connect name='x' body1='c' body2='c' anchor='0 0 0'/>"),
              "do not move against each other: x"));
   CHECK(said(with("<connect active='false' body1='c' anchor='0 0 0'/>"), "not active"));
   const auto summed = [&](const std::string& tendon) {
@@ -369,10 +369,42 @@ TEST_CASE("MJCF: loops close by connect and weld, and joints follow each other b
   const Scene two = mjcf_scene(summed("<tendon tendon1='u' tendon2='t' polycoef='0 .5 0 0 0'/>"));
   REQUIRE(two.couplings.size() == 1);
   CHECK(two.couplings[0].weights == std::vector<double>{-1, 1, 1.5});
-  CHECK(said(summed("<tendon tendon1='none'/>"), "tendons that are not fixed"));
+  CHECK(
+      said(summed("<tendon tendon1='s'/></equality><tendon><spatial name='s'/></tendon><equality>"),
+           "tendons that are not fixed"));
   CHECK(said(summed("<tendon name='s' tendon1='u'/>"), "tendons with one joint"));
   CHECK(said(summed("<tendon tendon1='t' polycoef='1'/>"), "tendons with a constant"));
   CHECK(mjcf_refusal(with("<connect body1='c'/>")).find("anchor") != std::string::npos);
+}
+
+TEST_CASE("MJCF: names of joints, tendons and bodies that are not there are refused") {
+  const auto with = [](const std::string& more) {
+    const std::string text =
+        world("<body name='b'><joint name='h'/><geom size='.1'/></body><geom name='g' size='.1'/>");
+    return text.substr(0, text.size() - std::string("</mujoco>\n").size()) + more + "</mujoco>\n";
+  };
+  const std::string tendon = "<tendon><fixed name='t'><joint joint='h'/></fixed></tendon>";
+  CHECK(mjcf_refusal(with(tendon + "<actuator><motor joint='h'/><motor tendon='t'/></actuator>"
+                                   "<contact><exclude body1='b' body2='world'/></contact>"))
+            .empty());
+  const auto refuses = [&](const std::string& more, const std::string& field) {
+    INFO(more);
+    const std::string said = mjcf_refusal(with(tendon + more));
+    CHECK(said.find(field) != std::string::npos);
+    CHECK(said.find("there is no such") != std::string::npos);
+  };
+  for (const char* kind : {"motor", "position", "general", "damper"}) {
+    refuses("<actuator><" + std::string(kind) + " name='m' joint='H'/></actuator>", "\"m\": joint");
+    refuses("<actuator><" + std::string(kind) + " jointinparent='b'/></actuator>", "jointinparent");
+    refuses("<actuator><" + std::string(kind) + " tendon='h'/></actuator>", "tendon");
+  }
+  refuses("<tendon><fixed name='u'><joint joint='t'/></fixed></tendon>", "joint");
+  refuses("<equality><joint joint1='none'/></equality>", "joint1");
+  refuses("<equality><joint joint1='h' joint2='none'/></equality>", "joint2");
+  refuses("<equality><tendon tendon1='t' tendon2='none'/></equality>", "tendon2");
+  refuses("<equality><connect body1='g' anchor='0 0 0'/></equality>", "body1");
+  refuses("<equality><weld body1='b' body2='none'/></equality>", "body2");
+  refuses("<contact><exclude body1='b' body2='h'/></contact>", "body2");
 }
 
 TEST_CASE("MJCF: actuators and armature that scenes lack are named, with what they are of") {

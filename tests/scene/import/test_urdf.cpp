@@ -192,7 +192,7 @@ TEST_CASE("a joint that mimics another one starts where it follows it, and is co
   };
   const std::string text = "<robot name='r'>\n" + link("a") + link("b") + link("c") + link("d") +
                            joint("j", "b", "<mimic joint='k' multiplier='-0.5' offset='0.1'/>") +
-                           joint("k", "c", "") + joint("l", "d", "<mimic joint='gone'/>") +
+                           joint("k", "c", "") + joint("l", "d", "<mimic joint='l'/>") +
                            "</robot>\n";
   ImportOptions options;
   options.positions = {{"k", 0.4}};
@@ -205,14 +205,19 @@ TEST_CASE("a joint that mimics another one starts where it follows it, and is co
   CHECK(scene.couplings[0].polynomial == std::vector<double>{-0.5});
   const int body = scene.joints[static_cast<std::size_t>(pair[0])].first;
   CHECK(scene.bodies[static_cast<std::size_t>(body)].position.x() == Approx(-0.1));
-  CHECK(says(made.remarks, "mimic of joints that are not there"));
+  CHECK(says(made.remarks, "mimic of joints that are none of their own here: l"));
+  std::string gone = text;
+  gone.replace(gone.find("joint='l'"), 9, "joint='gone'");
+  const std::string refused = urdf_refusal(gone);
+  CHECK(refused.find("joint \"l\": mimic: joint") != std::string::npos);
+  CHECK(refused.find("\"gone\": there is no such joint") != std::string::npos);
 }
 
 TEST_CASE("limits and friction follow the start; what scenes do not have is said by name") {
   const std::string text =
       two_links("revolute",
                 "<axis xyz='0 0 4'/><limit lower='-1' upper='2' effort='3' velocity='4'/>"
-                "<dynamics damping='0.5' friction='0.25'/><mimic joint='k'/><strange/>",
+                "<dynamics damping='0.5' friction='0.25'/><mimic joint='j'/><strange/>",
                 "<collision><geometry><mesh filename='x.stl'/></geometry></collision><visual/>");
   ImportOptions options;
   options.positions = {{"j", 0.5}};
