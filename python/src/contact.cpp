@@ -68,7 +68,11 @@ py::dict residuals(const tc::Problem& problem, const std::string& law, const Arr
 }
 
 py::dict prove(const tc::Problem& problem, const Array& impulses, double allowed) {
-  const tc::Proof p = tc::prove(problem, vector("impulses", impulses), allowed);
+  const View x = vector("impulses", impulses);
+  const tc::Proof p = [&] {
+    const py::gil_scoped_release others_run;
+    return tc::prove(problem, x, allowed);
+  }();
   using namespace py::literals;
   return py::dict("status"_a = std::string(name(p.status)), "radius"_a = p.radius,
                   "relative_radius"_a = p.relative_radius, "change"_a = p.change,

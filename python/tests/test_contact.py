@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import os
+import sys
+import threading
 import unittest
 
 import numpy as np
@@ -35,6 +37,25 @@ class OneContact(unittest.TestCase):
         self.assertEqual((proof["status"], proof["regimes"]), ("proven", ["sliding"]))
         self.assertAlmostEqual(proof["radius"], 0.5, 12)  # x = (10, 3, 4)
         self.assertEqual(p.prove([10, np.nan, 4])["status"], "not_proven")
+
+    def test_a_proof_lets_other_threads_run(self):
+        p = contact.Problem(np.eye(3), [10, 6, 8], [0.5])
+        x, ran, may_run = np.array([10.0, 3.0, 4.0]), [], threading.Lock()
+        may_run.acquire()
+        other = threading.Thread(target=lambda: (may_run.acquire(), ran.append(True)))
+        other.start()
+        before = sys.getswitchinterval()
+        sys.setswitchinterval(1000)  # s: only who waits without the lock lets others run
+        try:
+            may_run.release()
+            for _ in range(100000):
+                p.prove(x)
+                if ran:
+                    break
+            self.assertTrue(ran)
+        finally:
+            sys.setswitchinterval(before)
+            other.join()
 
     def test_in_the_plane(self):
         p = contact.Problem([[2.0, 0], [0, 4]], [1, 3], [0.2])
