@@ -44,15 +44,16 @@ void add_choice(CLI::App& command, const char* option, const char* what,
       ->default_str(now);
 }
 
-// The proof of one solution, as columns or as lines.
-void print_proof(const Proof& proof, bool csv) {
+// The proof of one solution, as columns or as lines; false: there is none.
+bool print_proof(const Proof& proof, bool csv) {
+  const bool holds = proof.status != ProofStatus::not_proven;
   if (csv) {
     std::printf(",%s,%.3e,%.3e,%.3e,%.3e", name(proof.status), proof.radius, proof.relative_radius,
                 proof.change, proof.relative_change);
-    return;
+    return holds;
   }
   std::printf("  %s", name(proof.status));
-  if (proof.status != ProofStatus::not_proven)
+  if (holds)
     std::printf(": an exact solution within %.3e N s, %.3e of the largest impulse", proof.radius,
                 proof.relative_radius);
   if (proof.status == ProofStatus::proven_nearby)
@@ -60,11 +61,12 @@ void print_proof(const Proof& proof, bool csv) {
                 proof.relative_change);
   std::printf("\n");
   if (!proof.reason.empty()) std::printf("  contact %d: %s\n", proof.contact, proof.reason.c_str());
+  return holds;
 }
 
-// Solves files that hold more than contacts: joints, masses, rolling friction.
-Status run_cones(const ContactArguments& arguments, const std::string& file,
-                 const ConeProblem& problem) {
+// Whether a file that holds more than contacts is solved: joints, masses, rolling friction.
+bool run_cones(const ContactArguments& arguments, const std::string& file,
+               const ConeProblem& problem) {
   const Options& o = arguments.options;
   const ConeSolution s = ConeSolver(o).solve(problem);
   const auto blocks = static_cast<int>(problem.cones().size());
@@ -76,7 +78,7 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
                 blocks, name(o.law), o.tolerance, name(s.status), s.error, s.counts.sweeps,
                 s.counts.factorisations, dissipation, energy_change, s.error,
                 arguments.prove ? ",not_proven,,,," : "");
-    return s.status;
+    return s.status == Status::solved;
   }
   std::printf("%s: %d cones of %d rows, %s\n", on_terminal(file).c_str(), blocks, problem.rows(),
               name(o.law));
@@ -85,7 +87,7 @@ Status run_cones(const ContactArguments& arguments, const std::string& file,
   std::printf("  energy change %.9e\n", energy_change);
   if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
   if (arguments.prove) std::printf("  not_proven: proofs are of friction contacts alone\n");
-  return s.status;
+  return s.status == Status::solved;
 }
 
 // Reads a file that is no problem of contacts alone; null for a pipe, which has been read by then.
@@ -119,7 +121,7 @@ void print(const std::string& file, const contact::Problem& problem, Law law, co
   if (!s.advice.empty()) std::printf("  %s\n", s.advice.c_str());
 }
 
-// 0: all solved, 1: some not solved, 2: some file or option is wrong.
+// 0: all solved, and proven where that is asked for, 1: some not, 2: some file or option is wrong.
 int run(const ContactArguments& arguments) {
   int status = 0;
   if (arguments.csv) {
@@ -136,25 +138,25 @@ int run(const ContactArguments& arguments) {
       } catch (const std::runtime_error&) {
         const std::unique_ptr<ConeProblem> cones = as_cones(file);
         if (!cones) throw;
-        if (run_cones(arguments, file, *cones) != Status::solved && status == 0) status = 1;
+        const bool good = run_cones(arguments, file, *cones) && !arguments.prove;
+        if (!good && status == 0) status = 1;
         continue;
       }
       const Options& o = arguments.options;
       const Solution s = Solver(o).solve(problem);
       const Residuals r = evaluate(problem, o.law, s.impulses);
-      if (s.status != Status::solved && status == 0) status = 1;
-      if (arguments.csv) {
+      if (arguments.csv)
         std::printf("%s,%d,%s,%g,%s,%.3e,%d,%d,%zu,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e,%.3e",
                     table_field(file).c_str(), problem.contacts(), name(o.law), o.tolerance,
                     name(s.status), s.error, s.counts.sweeps, s.counts.factorisations,
                     s.replaced.size(), r.signorini, r.cone, r.alignment, r.dissipation,
                     r.energy_change, r.fixed_point, r.natural_map);
-        if (arguments.prove) print_proof(prove(problem, s.impulses), true);
-        std::printf("\n");
-        continue;
-      }
-      print(file, problem, o.law, s, r);
-      if (arguments.prove) print_proof(prove(problem, s.impulses), false);
+      else
+        print(file, problem, o.law, s, r);
+      bool good = s.status == Status::solved;
+      if (arguments.prove) good = print_proof(prove(problem, s.impulses), arguments.csv) && good;
+      if (arguments.csv) std::printf("\n");
+      if (!good && status == 0) status = 1;
     } catch (const std::exception& e) {
       std::fprintf(stderr, "tether contact: %s\n", on_terminal(e.what()).c_str());
       status = 2;
@@ -177,7 +179,7 @@ void add_contact_command(CLI::App& app, int* status) {
              arguments->options.measure);
   command->add_flag("--strict", arguments->options.strict, "Never replace the law");
   command->add_flag("--prove", arguments->prove,
-                    "Prove that an exact solution is near; needs --law coulomb");
+                    "Prove that an exact solution is near, or exit with 1; needs --law coulomb");
   command->add_flag("--csv", arguments->csv, "One line a file");
   command->callback([arguments, status] {
     if (arguments->prove && arguments->options.law != Law::coulomb)
