@@ -112,6 +112,17 @@ TEST_CASE("an exception without text is an exception") {
   CHECK(end.flag == IDA_NLS_FAIL);
   CHECK(end.status == tp::Status::callback_fatal);
   CHECK(contains(end.message, "what() is null"));
+  const Ended empty = run(spoilt([](int n, tp::Vector) {
+    if (n == 20) throw std::runtime_error("");
+    return 0;
+  }));
+  CHECK(contains(empty.message, "threw: an exception without text"));
+  const Ended number = run(spoilt([](int n, tp::Vector) {
+    if (n == 20) throw 5;
+    return 0;
+  }));
+  CHECK(number.flag < 0);
+  CHECK(contains(number.message, "threw: what is no std::exception"));
 }
 
 TEST_CASE("rows that write past their count end the run by name") {

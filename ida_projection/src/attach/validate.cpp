@@ -96,8 +96,8 @@ void check_rows(const Constraints& set, long unknowns, N_Vector like) {
   if (const auto* sparse = std::get_if<SparseJacobian>(&set.jacobian))
     if (set.count > 0) check_pattern("SparseJacobian", *sparse, set.count, unknowns, true);
   if (const auto* gradients = std::get_if<Gradients>(&set.jacobian))
-    if (set.count > 0 && (!gradients->value || !gradients->fill))
-      reject("Gradients needs both value and fill");
+    if (set.count > 0 && (!gradients->value || !gradients->fill || gradients->make == nullptr))
+      reject("Gradients needs value and fill, and make as it was");
   if (const auto* user = std::get_if<UserProjection>(&set.jacobian))
     if (user->function == nullptr) reject("UserProjection::function is null");
   for (const Constraints& part : set.joined) check_rows(part, unknowns, like);

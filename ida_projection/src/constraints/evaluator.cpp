@@ -127,13 +127,12 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
   const Part* at = nullptr;
   const int flag = guarded(
       [&] {
-        int flag = 0;
         for (const Part& part : parts_) {
           at = &part;
-          flag = value_of(part, t, y, n, g + part.first_row);
-          if (flag != 0) break;
+          const int failed = value_of(part, t, y, n, g + part.first_row);
+          if (failed != 0) return failed;
         }
-        return flag;
+        return 0;
       },
       thrown_);
   return flag == 0 ? finite(t, g) : checked(flag, "value", *at);
@@ -188,14 +187,13 @@ Status Evaluator::all_rows(double t, const double* y, int n, const double* scale
   const char* what = "";
   const int flag = guarded(
       [&] {
-        int flag = 0;
         for (const Part& part : parts_) {
           at = &part;
-          flag = rows_of(part, t, y, n, scale, columns, place(part),
-                         g != nullptr ? g + part.first_row : nullptr, &what);
-          if (flag != 0) break;
+          const int failed = rows_of(part, t, y, n, scale, columns, place(part),
+                                     g != nullptr ? g + part.first_row : nullptr, &what);
+          if (failed != 0) return failed;
         }
-        return flag;
+        return 0;
       },
       thrown_);
   if (flag != 0) return checked(flag, what, *at);

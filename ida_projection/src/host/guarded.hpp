@@ -11,26 +11,30 @@ namespace tether::ida_projection {
 constexpr int kRecoverable = SUN_NLS_CONV_RECVR;  // IDA retries with a quarter of the step
 constexpr int kFatal = -1;                        // ends in IDA_NLS_FAIL
 
-/// Text of an exception; what() may be null.
+/// Text of an exception, never empty; what() may be null.
 inline const char* text_of(const std::exception& e) noexcept {
   const char* text = e.what();
-  return text != nullptr ? text : "an exception whose what() is null";
+  if (text == nullptr) return "an exception whose what() is null";
+  return *text != '\0' ? text : "an exception without text";
 }
 
 /// Runs a user callback: no exception leaves it. Returns the callback's int; `message` receives
 /// the text of an exception, which counts as fatal.
 template <class Call>
 int guarded(Call&& call, std::string& message) noexcept {
-  try {
-    return call();
-  } catch (const std::exception& e) {
+  const auto fail = [&message](const char* text) {
     try {
-      message = text_of(e);
+      message = text;
     } catch (...) {
     }
     return -1;
+  };
+  try {
+    return call();
+  } catch (const std::exception& e) {
+    return fail(text_of(e));
   } catch (...) {
-    return -1;
+    return fail("what is no std::exception");
   }
 }
 
