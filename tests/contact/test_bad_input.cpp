@@ -1,6 +1,8 @@
 // Tether: bad input is refused, naming the argument, its value and what would be right.
 // SPDX-License-Identifier: BSD-3-Clause
+#include <functional>
 #include <limits>
+#include <string>
 #include <tether/contact.hpp>
 #include <tether/contact/joint_laws.hpp>
 
@@ -347,4 +349,59 @@ TEST_CASE("bad input: enumerations out of range, and vectors that are too short 
   CHECK_THROWS_AS(p.rescaled({}, {}), std::invalid_argument);
   CHECK_THROWS_AS(p.rescaled({0, 0}, {0}), std::invalid_argument);
   CHECK_THROWS_AS(p.unpack({}, x), std::invalid_argument);
+}
+
+namespace {
+
+Stepper one_body(const SteppingOptions& options = {}) {
+  BodySet bodies;
+  bodies.add(1, Matrix3d::Identity(), Vector3d::Zero());
+  return Stepper(bodies, {}, {}, options);
+}
+
+std::string refused_option(const std::function<void(SteppingOptions&)>& change) {
+  SteppingOptions options;
+  change(options);
+  return refusal([&] { one_body(options); });
+}
+
+}  // namespace
+
+TEST_CASE("bad input: options of steps, with their values") {
+  CHECK(refused_option([](SteppingOptions&) {}).empty());
+  CHECK(refused_option([](SteppingOptions& o) { o.step = -2; }) ==
+        "stepping: step = -2: must be > 0 and finite");
+  CHECK(refused_option([](SteppingOptions& o) { o.near_part = kNan; }) ==
+        "stepping: near_part = nan: must be >= 0");
+  CHECK(refused_option([](SteppingOptions& o) { o.max_halvings = 31; }) ==
+        "stepping: max_halvings = 31: must lie in 0 .. 30");
+  CHECK_THAT(refused_option([](SteppingOptions& o) { o.gravity = Vector3d(0, kNan, 0); }),
+             Contains("stepping: gravity(1) = nan"));
+}
+
+TEST_CASE("bad input: enumerators of steps that are none") {
+  for (const int k : {4, 99, 255}) {
+    CHECK_THAT(refused_option([k](SteppingOptions& o) { o.law = static_cast<Law>(k); }),
+               Contains("law = " + std::to_string(k)));
+    CHECK_THAT(
+        refused_option([k](SteppingOptions& o) { o.gyroscopic = static_cast<Gyroscopic>(k); }),
+        Contains("gyroscopic = " + std::to_string(k)));
+    CHECK_THAT(refused_option(
+                   [k](SteppingOptions& o) { o.restitution_law = static_cast<RestitutionLaw>(k); }),
+               Contains("restitution_law = " + std::to_string(k)));
+    CHECK_THAT(refused_option([k](SteppingOptions& o) {
+                 o.simultaneous_impacts = static_cast<SimultaneousImpacts>(k);
+               }),
+               Contains("simultaneous_impacts = " + std::to_string(k)));
+  }
+}
+
+TEST_CASE("bad input: what a Stepper is told") {
+  Stepper stepper = one_body();
+  CHECK_THAT(refusal([&] { stepper.add_force("none", {}); }), Contains("force is empty"));
+  CHECK_THAT(refusal([&] { stepper.observe({}); }), Contains("observer is empty"));
+  CHECK_THAT(refusal([&] { stepper.start_anew(-1); }), Contains("steps = -1: must be >= 0"));
+  stepper.step();
+  stepper.bodies().motion.clear();
+  CHECK_THAT(refusal([&] { stepper.step(); }), Contains("motion has 0 entries: 1 are needed"));
 }

@@ -16,9 +16,27 @@ Stepper::Implementation::Implementation(BodySet bodies, std::vector<Surface> sur
                                         const SteppingOptions& options)
     : steps(std::move(bodies), std::move(surfaces), meetings, options),
       halving(steps),
-      accurate(steps, halving) {}
+      accurate(steps, halving),
+      count(steps.bodies.position.size()) {}
+
+// Callers of bodies() may have changed their number.
+void Stepper::Implementation::check_lengths() const {
+  const auto demand = [this](const char* name, std::size_t entries) {
+    if (entries != count)
+      detail::refuse_size(std::string("bodies: ") + name, static_cast<Eigen::Index>(entries),
+                          static_cast<Eigen::Index>(count), "one for each body of the start");
+  };
+  const BodySet& b = steps.bodies;
+  demand("position", b.position.size());
+  demand("orientation", b.orientation.size());
+  demand("motion", b.motion.size());
+  demand("mass", b.mass.size());
+  demand("inertia", b.inertia.size());
+  demand("inverse_inertia", b.inverse_inertia.size());
+}
 
 void Stepper::Implementation::step() {
+  check_lengths();
   steps.tally = {};
   steps.unmeetable = false;
   const double start = static_cast<double>(steps.counts.steps) * steps.options.step + late;
@@ -53,10 +71,12 @@ Stepper::Stepper(Stepper&&) noexcept = default;
 Stepper& Stepper::operator=(Stepper&&) noexcept = default;
 
 void Stepper::add_force(const char* effect, Force force) {
+  if (!force) throw std::invalid_argument("Stepper::add_force: force is empty");
   implementation_->steps.add_force(effect, std::move(force));
 }
 
 void Stepper::observe(StepObserver observer) {
+  if (!observer) throw std::invalid_argument("Stepper::observe: observer is empty");
   implementation_->steps.observe(std::move(observer));
 }
 
@@ -172,6 +192,7 @@ void Stepper::set_memory(const StepperMemory& m) {
 
 void Stepper::start_anew(long steps, double late) {
   detail::SubStepper& s = implementation_->steps;
+  detail::require(steps >= 0, "stepping: steps", static_cast<double>(steps), "must be >= 0");
   if (!(late >= 0 && late < s.options.step))
     throw std::invalid_argument("stepping: a start that is " + detail::shown(late) +
                                 " s late, but a step has " + detail::shown(s.options.step) + " s");

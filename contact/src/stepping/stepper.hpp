@@ -1,6 +1,7 @@
 // Tether: impulse-velocity steps. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "stepping/accurate_steps.hpp"
@@ -13,11 +14,13 @@ struct Stepper::Implementation {
   Implementation(BodySet bodies, std::vector<Surface> surfaces,
                  const std::vector<Meeting>& meetings, const SteppingOptions& options);
   void step();
+  void check_lengths() const;
 
   detail::SubStepper steps;
   detail::StepHalving halving;
   detail::AccurateSteps accurate;
-  double late = 0;  // how much later than its boundary the next step begins, s
+  std::size_t count;  // of bodies
+  double late = 0;    // how much later than its boundary the next step begins, s
 };
 
 }  // namespace tether::contact
