@@ -329,3 +329,31 @@ TEST_CASE("a picture has the name that is asked for, whatever shells make of it"
   CHECK_FALSE(fs::exists(path / "x"));
   CHECK(content(path / scene.output["svg"]).find("<svg") != std::string::npos);
 }
+
+// A carriage that strikes a spring of 1e6 N on a millionth of a metre oscillates with the tolerance
+// for its amplitude; the energy of .5 J came to twice and twenty times as much without a word.
+TEST_CASE("run: energy that nothing takes or gives is kept, or the summary says so") {
+  const auto warned = [](const std::string& engine, const std::string& spring) {
+    return run(parse_scene("[scene]\nend = 0.02\n" + engine +
+                               "[[body]]\nname = \"b\"\nmass = 1\ninertia = [1, 1, 1]\n"
+                               "velocity = [1, 0, 0]\n[[joint]]\nkind = \"slider\"\n"
+                               "bodies = [\"b\", \"world\"]\naxis = [1, 0, 0]\nspring = { " +
+                               spring + " }\n",
+                           "spring.toml"))
+        .warnings;
+  };
+  const std::string soft = "stiffness_table = [[1e-2, 100]]",
+                    hard = "stiffness_table = [[1e-6, 1e6]]", linear = "stiffness = 1e12",
+                    damped = "stiffness = 1e4, damping = 200";
+  for (const std::string engine : {"[smooth]\n", "engine = \"event\"\n"}) {
+    INFO(engine);
+    CHECK(warned(engine, soft).empty());
+    CHECK(warned(engine, damped).empty());
+    for (const std::string& spring : {hard, linear}) {
+      INFO(spring);
+      const std::vector<std::string> said = warned(engine, spring);
+      REQUIRE(said.size() == 1);
+      CHECK(said[0].find("the tolerance does not resolve the motion") != std::string::npos);
+    }
+  }
+}

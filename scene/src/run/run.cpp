@@ -5,6 +5,7 @@
 #include <tether/scene/words.hpp>
 
 #include "certificate/sheet.hpp"
+#include "effects/list.hpp"
 #include "judge.hpp"
 #include "output/binary.hpp"
 #include "output/files.hpp"
@@ -61,6 +62,21 @@ std::unique_ptr<Engine> engine_of(const Scene& scene, const Plan& plan, contact:
       "several processes share steps with impulses; this scene is moved by the engine \"{}\", in "
       "one process ({})",
       word(plan.engine), plan.why));
+}
+
+// Resolved motions change the energy by some tolerances.
+constexpr double kEnergyChange = 0.1;     // of the largest kinetic energy
+constexpr double kEnergyRounding = 1e-6;  // of energies whose sum is small
+
+/// Whether only weight, springs without damping and joints without laws act between bodies that
+/// nothing touches: the energy stays what it is.
+bool keeps_energy(const Scene& scene, const Plan& plan) {
+  if (plan.engine == EngineKind::stepping || plan.pairs > 0 || effects::has_joint_laws(scene))
+    return false;
+  const auto changes = [](const Joint& joint) { return joint.window.has_value(); };
+  return !any_of(scene.joints, changes) &&
+         !any_of(effects::all(),
+                 [&](const effects::Effect* each) { return each->does_work(scene); });
 }
 
 /// One run from its start, or from a saved state, to the end.
@@ -198,6 +214,8 @@ class Run {
     s.penetration = std::max(s.penetration, d.penetration);
     s.residual = std::max(s.residual, d.residual);
     s.contacts = std::max(s.contacts, d.contacts);
+    most_kinetic_ = std::max(most_kinetic_, d.kinetic_energy);
+    most_energy_ = std::max({most_energy_, d.kinetic_energy, std::abs(d.potential_energy)});
     note_fastest_turn();
     for (const auto& recorder : recorders_) recorder->record(*engine_, d);
     if (options_.progress) options_.progress(engine_->time());
@@ -248,6 +266,7 @@ class Run {
           "body \"{}\" turns by {:.3g} rad in a step: its rotation is not resolved, its energy not "
           "kept; stepping.step should be below {:.2g} s",
           scene_.bodies[fastest_].name, fastest_turn_, 0.1 * *step_ / fastest_turn_));
+    warn_of_energy();
     if (result_.counts.unsolved > 0)
       result_.warnings.push_back(
           fmt::format("{} contact problems were not solved (stepping.on_failure = \"warn\")",
@@ -255,6 +274,18 @@ class Run {
     if (result_.counts.unsolved == 0 && result_.counts.accepted > 0) warn_of_residual();
     result_.whole_seconds = watch_.processor();
     result_.whole_wall = watch_.wall();
+  }
+
+  // Tolerances are of places: a motion that is smaller than they, as on a very stiff spring, may
+  // take or give any energy.
+  void warn_of_energy() {
+    if (!keeps_energy(scene_, plan_)) return;
+    const double change = std::max(summary().largest_change, -summary().lowest_change);
+    if (change > kEnergyChange * most_kinetic_ && change > kEnergyRounding * most_energy_)
+      result_.warnings.push_back(fmt::format(
+          "the energy changes by {:.2g} J, of at most {:.2g} J of motion, though nothing takes or "
+          "gives any: the tolerance does not resolve the motion",
+          change, most_kinetic_));
   }
 
   // Within its own limit a residual is said by the summary alone.
@@ -342,9 +373,10 @@ class Run {
   double done_ = -1;  // the last event
   bool recorded_ = false, saved_ = false, is_over_ = false;
   double last_record_ = 0;
-  std::optional<double> step_;  // of the stepping engine
-  double fastest_turn_ = 0;     // rad in a step
-  std::size_t fastest_ = 0;     // body
+  std::optional<double> step_;                 // of the stepping engine
+  double fastest_turn_ = 0;                    // rad in a step
+  std::size_t fastest_ = 0;                    // body
+  double most_kinetic_ = 0, most_energy_ = 0;  // since the start or the restart, J
 };
 
 }  // namespace
