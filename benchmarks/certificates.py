@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Certificates of scenes, judged by both checkers, as a table. SPDX-License-Identifier: BSD-3-Clause
+"""Certificates of whole scenes, judged by both checkers, as a table. SPDX-License-Identifier: BSD-3-Clause
 
-    python3 benchmarks/certificates.py TETHER END SCENE.toml..."""
+    python3 benchmarks/certificates.py TETHER SCENE.toml..."""
 import pathlib
 import re
 import subprocess
@@ -12,13 +12,13 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 VERDICTS = {0: "holds", 1: "BROKEN", 2: "not judged"}
 
 
-def main(program, end, *scenes):
+def main(program, *scenes):
     worst = 0
     print("| scene | `tether verify` | `verify.py` | judgements | MB |\n|---|---|---|---|---|")
     for scene in map(pathlib.Path, scenes):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "run.cert"
-            subprocess.run([str(pathlib.Path(program).resolve()), "run", scene.name, "--end", end, "--certificate", str(file), "--quiet"],
+            subprocess.run([str(pathlib.Path(program).resolve()), "run", scene.name, "--certificate", str(file), "--quiet"],
                            cwd=scene.parent, capture_output=True)
             ours = subprocess.run([program, "verify", str(file)], capture_output=True, text=True)
             other = subprocess.run([sys.executable, str(ROOT / "scene/tools/verify.py"), str(file)], capture_output=True, text=True)

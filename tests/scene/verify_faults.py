@@ -17,7 +17,7 @@ import verify  # noqa: E402
 from verify import V, rotation  # noqa: E402
 
 SCENES = {"rolling_sphere": 0.02, "icy_wedge": 0.01, "stack": 0.1, "cart": 0.02, "gripper": 0.02, "pulled_block": 0.2, "bricard": 0.2,
-          "clearance": 0.002, "hanging_frame": 1.0}
+          "clearance": 0.002, "hanging_frame": 1.0, "rocking_block": 5.0}
 PART = 1e-3  # of a number: what a small fault changes
 
 
@@ -162,8 +162,7 @@ def damaged(random_, program, file, lines):
     """What is cut, or of wild bytes, is no certificate; what is accepted of it, or crashes."""
     text, bad = "".join(lines), []
     for wrong in ("", text[:-5], text[: len(text) // 2], "tether certificate 1\n", text.replace("engine", "motor", 1), text + "to 0\n",
-                  text.replace("to 1 ", "to 77 "), text.replace("\npart", "\nlaw"), text.replace("\nvia ", "\nvia 9", 1),
-                  text.replace("\nvia 1 ", "\nplaced 91 1 ", 1)):
+                  text.replace("to 1 ", "to 77 "), text.replace("\npart", "\nlaw"), text.replace("\nto 1 ", "\nplaced 91 1 ", 1)):
         if judged(program, file, [wrong]) != (2, 2):
             bad.append(wrong[:40])
     missing = subprocess.run([program, "verify", f"{file}.missing"], capture_output=True, text=True)

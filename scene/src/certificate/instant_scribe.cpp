@@ -72,7 +72,8 @@ void InstantScribe::set_places(double time, const std::vector<BodyState>& states
 
 void InstantScribe::put_impact(double time, const std::vector<BodyState>& before,
                                const std::vector<BodyState>& after,
-                               const std::vector<ContactState>& contacts, bool exact) {
+                               const std::vector<ContactState>& contacts,
+                               const std::vector<ContactState>& rest, bool exact) {
   std::string out, inside;
   set_places(time, after);
   Eigen::VectorXd momenta = Eigen::VectorXd::Zero(6 * bodies_.moving);
@@ -86,6 +87,19 @@ void InstantScribe::put_impact(double time, const std::vector<BodyState>& before
     momenta.segment<3>(6 * bodies_.inertia[b].slot + 3) =
         R * (scene_.bodies[b].inertia * (R.transpose() * dw));
   }
+  const auto acts = [&](int body, const Vector3d& force, const Vector3d& moment) {
+    const int slot = bodies_.inertia[at(body)].slot;
+    momenta.segment<3>(6 * slot) -= force;
+    momenta.segment<3>(6 * slot + 3) -= moment;
+  };
+  for (const ContactState& c : rest)
+    for (const auto& [body, sign] : {std::pair(c.first, 1.0), std::pair(c.second, -1.0)}) {
+      if (!scene_.moves(body)) continue;
+      const Vector3d force = sign * c.force;
+      const Vector3d moment = sign * c.moment + (c.point - after[at(body)].position).cross(force);
+      acts(body, force, moment);
+      Line(inside, "push") << body << force << moment << "rest";
+    }
   double worst = 0;
   for (const ContactState& c : contacts) {
     Vector3d w = surface_velocity(c.first, c.point) - surface_velocity(c.second, c.point);
@@ -98,9 +112,7 @@ void InstantScribe::put_impact(double time, const std::vector<BodyState>& before
       w += sign * (s.velocity + s.angular_velocity.cross(arm));
       if (!scene_.moves(body)) continue;
       inverse += 1 / scene_.bodies[at(body)].mass;
-      const int slot = bodies_.inertia[at(body)].slot;
-      momenta.segment<3>(6 * slot) -= sign * c.force;
-      momenta.segment<3>(6 * slot + 3) -= sign * (c.moment + arm.cross(c.force));
+      acts(body, sign * c.force, sign * (c.moment + arm.cross(c.force)));
     }
     // Newton's law is that the speed after is none, or a part of that before.
     const double bias = c.normal.dot(c.force) > 0 ? -c.normal.dot(w) : 0;

@@ -22,11 +22,11 @@ class InstantScribe final : public Source {
 
   void flush() override;
   /// An impact at this time of bodies in the same places: velocities before and after, and its
-  /// contacts, with impulses in the place of forces. What they leave of it joints have done.
-  /// `exact`: velocities obey the law of impacts.
+  /// contacts, with impulses in the place of forces. `rest`: impulses that end accumulating
+  /// impacts. What they leave of it joints have done. `exact`: velocities obey the law of impacts.
   void put_impact(double time, const std::vector<BodyState>& before,
                   const std::vector<BodyState>& after, const std::vector<ContactState>& contacts,
-                  bool exact);
+                  const std::vector<ContactState>& rest, bool exact);
 
  private:
   void put_pushes(std::string& out);

@@ -21,7 +21,7 @@ Verdict Judge::run(const std::string& file) {
   Record line;
   while (reader.next(line)) {
     const bool of_block =
-        is_one_of(line.word, {"push", "contact", "pull", "law", "via", "placed", "rate"});
+        is_one_of(line.word, {"push", "contact", "pull", "law", "placed", "rate"});
     if (of_block && !block_) throw Damaged(line.word + " is of no part");
     if (of_block || line.word == "to") {
       lines_.push_back(line);
@@ -183,8 +183,25 @@ void Judge::hold(const States& to) {
 // Impulses of effects; of an instant (factor 1) forces.
 void Judge::push(double factor, const States& to, Loads& loads) {
   std::map<double, int> weights;
+  double power = 0, size = 0;
   each("push", [&](const auto& n, const auto& effect) {
-    if (to.count(n[0]) > 0) loads[n[0]].add(vector(n, 1), vector(n, 4));
+    const auto found = to.find(n[0]);
+    if (found == to.end()) throw Damaged("a push on a body that does not move");
+    const Vector3d force = vector(n, 1), torque = vector(n, 4);
+    loads[n[0]].add(force, torque);
+    // An impact has no forces: these stop what moves too slowly to count, and do no work on what
+    // is left.
+    if (factor == 0) {
+      const JudgedBody& b = body(n[0]);
+      const Told &begin = *b.state, &end = found->second;
+      expect("comes to rest",
+             force.norm() / b.mass +
+                 b.unspin(end.q, torque).norm() * std::sqrt(b.inertia.trace() / b.mass),
+             kSlow, b.name);
+      power += force.dot(end.v) + torque.dot(end.w);
+      size += force.norm() * (end.v.norm() + begin.v.norm()) +
+              torque.norm() * (end.w.norm() + begin.w.norm());
+    }
     if (effect != "gravity") return;
     ++weights[n[0]];
     const Vector3d weight = factor * body(n[0]).mass * gravity_;
@@ -193,6 +210,10 @@ void Judge::push(double factor, const States& to, Loads& loads) {
     expect("weight", (vector(n, 1) - weight).norm(), kRounding * weight.norm() + rounding,
            body(n[0]).name);
   });
+  const bool belts = std::any_of(bodies_.begin(), bodies_.end(), [](const auto& each) {
+    return !each.second.belt.isZero(0) || !each.second.belt_turn.isZero(0);
+  });
+  if (!belts) expect("work of what comes to rest", std::abs(power), kBalance * size, "impact");
   if (!gravity_.isZero(0) && factor > 0)
     for (const auto& [number, s] : to)
       expect("weight acts", std::abs(1.0 - weights[number]), 0, body(number).name);
@@ -241,8 +262,10 @@ void Judge::pull_of(const JudgedJoint& joint, const std::vector<double>& n, bool
 }
 
 void Judge::push_by_contacts(Loads& loads) {
+  near_.clear();
   each("contact", [&](const auto& n, const auto&) {
     const JudgedContact c(n);
+    near_[{c.body[0], c.body[1]}].push_back(c.on[0]);
     for (int k = 0; k < 2; ++k) {
       const auto load = loads.find(c.body[k]);
       if (load == loads.end()) continue;
@@ -278,15 +301,13 @@ double Judge::contact(const JudgedContact& c, double dt, const States& came, con
     round = std::min(round, r.norm());
     flat = std::max(flat, 5 * b.inertia.trace() / b.mass / std::max(std::abs(r.dot(c.n)), 1e-300));
   }
-  each("contact", [&](const auto& n, const auto&) {
-    if (n[0] == c.body[0] && n[1] == c.body[1])
-      patch = std::max(patch, (vector(n, 2) - c.on[0]).norm());
-  });
+  for (const Vector3d& p : near_[{c.body[0], c.body[1]}])
+    patch = std::max(patch, (p - c.on[0]).norm());
   const double spins = (free.at(c.body[0]).w - free.at(c.body[1]).w).norm();
   const double most = std::max(before.norm(), comes.norm());
   const double middle =
       dt * (turning * fast + spins * spins * flat + most * most / std::max(round, 1e-300)) +
-      spins * patch + kRounding * (1 + fast);
+      spins * patch;
   const double push = c.x.dot(c.n), spin = c.moment.dot(c.n), size = c.x.norm();
   expect("points of contact", (c.on[0] - c.on[1]).norm(),
          std::abs(c.gap) * (1 + kLaw) + kRounding * (1 + c.on[0].norm()), what);
@@ -295,7 +316,8 @@ double Judge::contact(const JudgedContact& c, double dt, const States& came, con
          std::max(std::abs(spin) - pair.torsional * push,
                   (c.moment - spin * c.n).norm() - pair.rolling * push),
          kBalance * push + kRounding, what);
-  expect("surface speed", (c.slip - belts + belts.dot(c.n) * c.n).norm(), middle, what);
+  const double rounding = kRounding * (1 + fast);
+  expect("surface speed", (c.slip - belts + belts.dot(c.n) * c.n).norm(), middle + rounding, what);
   const double off = natural_residual(law, c.n, inverse * c.x, w + c.slip + c.bias * c.n);
   if (block_->word == "instant") {
     expect("contact closed", std::abs(c.gap), kInstant, what);
@@ -309,11 +331,11 @@ double Judge::contact(const JudgedContact& c, double dt, const States& came, con
   speed = std::max(speed, before.norm() + comes.norm() + c.slip.norm() + std::abs(c.bias) +
                               size * inverse + gravity_.norm() * dt);
   const double approach = -before.dot(c.n), approaches = -comes.dot(c.n);
-  double wrong = std::abs(c.bias - (dt > 0 ? std::max(c.gap, 0.0) / dt : 0));
+  double wrong = std::abs(c.bias - (dt > 0 ? std::max(c.gap, 0.0) / dt : 0)) - middle;
   if (approaches * dt > c.gap || dt == 0)
-    wrong = std::min({wrong, std::abs(c.bias),
+    wrong = std::min({wrong, std::abs(c.bias) - middle,
                       std::abs(c.bias + pair.restitution * std::min(approach, approaches))});
-  if (block_->numbers[2] == 0) expect("restitution, or gap that closes", wrong, middle, what);
+  if (block_->numbers[2] == 0) expect("restitution, or gap that closes", wrong, rounding, what);
   return off;
 }
 

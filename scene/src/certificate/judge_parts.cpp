@@ -29,11 +29,7 @@ void Judge::part(const States& to) {
   };
   const States free = moved();
   push_by_contacts(loads);
-  States mid = moved();
-  each("via", [&](const auto& n, const auto&) {
-    body(n[0]);
-    mid[n[0]].v = vector(n, 1), mid[n[0]].w = vector(n, 4);
-  });
+  const States mid = moved();
   contacts(dt, came, free, mid);
   each("law", [&](const auto& n, const auto&) { law_of_joint(n, dt, came, mid); });
   States placed;

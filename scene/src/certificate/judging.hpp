@@ -28,6 +28,7 @@ using Eigen::Matrix3d;
 inline constexpr double kBalance = 1e-6;    // of the impulses or forces on a body
 inline constexpr double kLaw = 1e-6;        // of the speeds at contacts
 inline constexpr double kUseful = 1e-2;     // residual of a problem whose solution a step may use
+inline constexpr double kSlow = 1e-3;       // m/s: what may stop with no contact that pushes
 inline constexpr double kHolds = 1e-6;      // of the arms and speeds of a joint
 inline constexpr double kTimes = 1e-15;     // of times: their rounding
 inline constexpr double kRounding = 1e-9;   // of places, times and frames
@@ -184,7 +185,8 @@ class Judge {
   std::optional<Record> block_;
   std::vector<Record> lines_;
   std::map<double, std::pair<std::optional<Told>, double>> before_trial_;
-  std::map<double, Told> trial_;  // its end
+  std::map<double, Told> trial_;                                     // its end
+  std::map<std::pair<double, double>, std::vector<Vector3d>> near_;  // points of two bodies
   std::deque<Instant> past_;
 };
 

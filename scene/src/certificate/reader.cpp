@@ -39,7 +39,6 @@ const std::map<std::string, Form, std::less<>>& forms() {
                                                                {"contact", {22}},
                                                                {"pull", {14}},
                                                                {"law", {10, true}},
-                                                               {"via", {7}},
                                                                {"placed", {8}},
                                                                {"to", {14}},
                                                                {"rate", {7}},

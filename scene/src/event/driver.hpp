@@ -67,10 +67,10 @@ class Driver {
   Driver(Model& model, const DriverOptions& options, const Memory& memory);
   Memory memory() const;  ///< of the start of the present phase
 
-  /// Told of each impact: its contacts, their impulses by row, and the velocities before. `exact`:
-  /// its velocities obey the law of impacts.
+  /// Told of each impact: its contacts, their impulses by row, those that end accumulating impacts
+  /// (or none), and the velocities before. `exact`: its velocities obey the law of impacts.
   using Struck = std::function<void(const ContactRows& rows, const VectorXd& x,
-                                    const VectorXd& before, bool exact)>;
+                                    const VectorXd& rest, const VectorXd& before, bool exact)>;
   void observe(Struck struck) { struck_ = std::move(struck); }
 
   /// To time t; early where `interrupted`, and where `excess` is above 0 first, a function of the

@@ -103,11 +103,15 @@ class EventEngine : public ResumableEngine {
       scribe_ = std::make_unique<certificate::InstantScribe>(
           *to_certify_, *this, [this] { return accelerations(); }, *to_certify_->certificate);
     if (scribe_)
-      driver_->observe([this](const ContactRows& rows, const VectorXd& x, const VectorXd& before,
-                              bool exact) { put_impact(rows, x, before, exact); });
+      driver_->observe([this](const ContactRows& rows, const VectorXd& x, const VectorXd& rest,
+                              const VectorXd& before, bool exact) {
+        put_impact(before, struck(rows, x), struck(rows, rest), exact);
+      });
   }
   ContactState touching(int contact, const Vector3d& on_first) const;
-  void put_impact(const ContactRows& rows, const VectorXd& x, const VectorXd& before, bool exact);
+  std::vector<ContactState> struck(const ContactRows& rows, const VectorXd& x) const;
+  void put_impact(const VectorXd& before, const std::vector<ContactState>& contacts,
+                  const std::vector<ContactState>& rest, bool exact);
   std::vector<std::array<Vector3d, 2>> accelerations() const;
   VectorXd coordinates_of(const std::vector<BodyState>& bodies) const;
   StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
@@ -222,8 +226,8 @@ ContactState EventEngine::touching(int contact, const Vector3d& on_first) const 
 }
 
 // The model has the state after it.
-void EventEngine::put_impact(const ContactRows& rows, const VectorXd& x, const VectorXd& before,
-                             bool exact) {
+void EventEngine::put_impact(const VectorXd& before, const std::vector<ContactState>& contacts,
+                             const std::vector<ContactState>& rest, bool exact) {
   std::vector<BodyState> after = bodies_;
   const smooth::MovingBodies& bodies = model_->bodies();
   bodies.read(model_->bodies_state(), after);
@@ -237,10 +241,15 @@ void EventEngine::put_impact(const ContactRows& rows, const VectorXd& x, const V
       to_world(each->position);
     }
   }
+  scribe_->put_impact(units_.time * bodies.all().time, came, after, contacts, rest, exact);
+}
+
+// Contacts with impulses in the place of forces; without impulses by row: none.
+std::vector<ContactState> EventEngine::struck(const ContactRows& rows, const VectorXd& x) const {
   const double impulse = units_.mass * units_.speed();
   std::vector<ContactState> contacts;
   std::vector<int> holders;
-  for (std::size_t k = 0; k < rows.contacts().size(); ++k) {
+  for (std::size_t k = 0; k < rows.contacts().size() && x.size() > 0; ++k) {
     const int contact = rows.contacts()[k];
     const Vector3d on_first = model_->is_law(contact)
                                   ? Vector3d(Vector3d::Zero())
@@ -254,7 +263,7 @@ void EventEngine::put_impact(const ContactRows& rows, const VectorXd& x, const V
     holders.push_back(contact);
     contacts.push_back(touching(contact, impulse * on_first));
   }
-  scribe_->put_impact(units_.time * model_->bodies().all().time, came, after, contacts, exact);
+  return contacts;
 }
 
 std::vector<std::array<Vector3d, 2>> EventEngine::accelerations() const {

@@ -79,8 +79,9 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
 }
 
 // The contacts that touch and move apart no faster than `speed` stay together, and those that slip
-// no faster stick: impulses in both directions, added to x. Returns the energy that is lost.
-double Driver::come_to_rest(const std::vector<int>& touching, double speed, VectorXd& added) {
+// no faster stick: by impulses in both directions, for those of the weight in the time left out.
+// Returns the energy that is lost.
+double Driver::come_to_rest(const std::vector<int>& touching, double speed, VectorXd& x) {
   ContactRows rows(model_, touching);
   const VectorXd w = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   std::vector<int> slow;
@@ -96,9 +97,8 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed, Vect
   linalg::LeastSquares factor;
   factor.factor(part.A);
   const VectorXd forces = factor.solve(part.b);
-  VectorXd x = VectorXd::Zero(w.size());
+  x.setZero(w.size());
   for (int i = 0; i < n; ++i) x[slow[at(i)]] = forces[i];
-  if (struck_) added += x;
   return change_velocities(rows.change(x));
 }
 
@@ -197,9 +197,9 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
                      answer.error));
   const VectorXd coming = struck_ ? VectorXd(u) : VectorXd();
   double lost = change_velocities(rows.change(answer.x));
-  VectorXd whole = struck_ ? answer.x : VectorXd();
-  if (impact.fastest > 0) lost += come_to_rest(set, impact.fastest, whole);
-  if (struck_) struck_(rows, whole, coming, impact.fastest == 0 && !plastic);
+  VectorXd rest;
+  if (impact.fastest > 0) lost += come_to_rest(set, impact.fastest, rest);
+  if (struck_) struck_(rows, answer.x, rest, coming, impact.fastest == 0 && !plastic);
   record_impacts(rows, impact, before, rows.velocities(u), answer.x, lost);
 }
 
@@ -360,7 +360,7 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities) {
   const VectorXd coming =
       struck_ ? VectorXd(y_.segment(motion_.coordinates(), motion_.velocities())) : VectorXd();
   const double lost = change_velocities(rows.change(answer.x));
-  if (struck_) struck_(rows, answer.x, coming, false);
+  if (struck_) struck_(rows, answer.x, {}, coming, false);
   const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
   bool first = true;
   for (int k = 0; k < static_cast<int>(rows.parts().size()); ++k) {

@@ -291,8 +291,6 @@ void StepScribe::end_part(const contact::StepStage& stage) {
   part.text += inside;
   for (const int i : now_) {
     part.before.push_back(chain_[at(i)]);
-    if (held_[at(i)] != 0 && (!contacts_.points.empty() || joints_->has_laws()))
-      Line(part.text, "via") << i << solved_[at(i)].velocity << solved_[at(i)].angular_velocity;
     if (!same_place(placed_[at(i)], begin_[at(i)]))
       Line(part.text, "placed") << i << placed_[at(i)].position << placed_[at(i)].orientation;
   }
