@@ -10,17 +10,18 @@ import math
 import operator
 import sys
 
-# How much a law may be off, as a part of the times, places, speeds, impulses or forces that it is about.
-LAWS = {"contact problems solved": 0, "residual of contact problems": 1e-2, "residual as claimed": 1e-4, "fixed bodies rest": 0,
-        "comes to rest": 1e-3, "work of what comes to rest": 1e-6, "unit length": 1e-9, "time goes on": 1e-9, "motion goes on": 1e-6, "weight": 1e-9, "weight acts": 0,
-        "balance of momentum": 1e-6, "balance of angular momentum": 1e-6, "places move as velocities": 1e-6,
-        "orientation moves as velocities": 1e-6, "corrections close gaps": 10, "extrapolation": 1e-6,
-        "joints hold": 1e-6, "joints' velocities": 1e-6, "joints' accelerations": 1e-4, "reaction": 1e-9,
-        "moment of reaction": 1e-6, "reaction of the joint's kind": 1e-6, "limit, motor, friction or spring": 1e-4,
-        "points of contact": 1 + 1e-6, "contact closed": 1e-4, "contact pushes within its cone": 1e-6, "law of contact": 1e-6,
-        "law of contact at an instant": 1e-4, "moments of friction": 1e-6, "restitution, or gap that closes": 1e-9, "surface speed": 1,
-        "equations of motion": 1e-5, "equations of rotation": 1e-5, "places follow velocities": 1e-5, "momentum leads on": 1e-5,
-        "angular momentum leads on": 1e-5, "places lead on": 1e-5, "orientation leads on": 1e-5}
+# How much laws may be off: the part of the times, places, speeds, impulses or forces that they are about.
+LAWS = {law: part for part, laws in {
+    0: "contact problems solved, fixed bodies rest, weight acts",
+    1e-9: "unit length, time goes on, weight, reaction, restitution or gap that closes",
+    1e-6: "motion goes on, balance of momentum, balance of angular momentum, places move as velocities, orientation moves as velocities, "
+          "extrapolation, joints hold, joints' velocities, moment of reaction, reaction of the joint's kind, law of contact, "
+          "contact pushes within its cone, moments of friction, work of what comes to rest",
+    1e-5: "equations of motion, equations of rotation, places follow velocities, momentum leads on, angular momentum leads on, "
+          "places lead on, orientation leads on",
+    1e-4: "residual as claimed, joints' accelerations, law of a joint, contact closed, law of contact at an instant",
+    1e-3: "comes to rest", 1e-2: "residual of contact problems", 1: "surface speed", 1 + 1e-6: "points of contact",
+    10: "corrections close gaps"}.items() for law in laws.split(", ")}
 # Numbers of a line; "+": or more; "t": then a text.
 HEADS = {"body": "9t", "surface": "10", "pair": "7", "gravity": "3", "engine": "0t", "joint": "23t", "coupled": "2+", "step": "5", "end": "1"}
 BLOCKS = {"part": "4", "trial": "4", "extrapolated": "1", "start": "1", "instant": "2", "arrives": "1"}
@@ -368,7 +369,7 @@ class Judge:
         wrong = max(abs(bias - (max(gap, 0.0) / dt if dt > 0 else 0.0)) - middle, 0.0)
         if -(comes_w @ normal) * dt > gap or dt == 0:
             wrong = min(wrong, max(abs(bias) - middle, 0.0), abs(bias - restitution * max(came_w @ normal, comes_w @ normal)))
-        self.expect("restitution, or gap that closes", 0 if composed else wrong, 1 + fast, what)
+        self.expect("restitution or gap that closes", 0 if composed else wrong, 1 + fast, what)
         return off, abs(came_w) + abs(comes_w) + abs(slip) + abs(bias) + abs(x) * inverse + abs(self.gravity) * dt, what
 
     def joint_law(self, n, came, mid, dt, composed):
@@ -383,7 +384,7 @@ class Judge:
         if law == 2 and not composed:
             there = [-dt * (stiffness * (stretch + dt * (speed - rate)) + damping * (speed - rate))]
         off = min(abs(x - max(low, min(high, each))) for each in there) * inverse
-        self.expect("limit, motor, friction or spring", off, abs(x) * inverse + abs(speed) + abs(before) + abs(rate) + abs(gap) / dt, self.joints[n[0]].name)
+        self.expect("law of a joint", off, abs(x) * inverse + abs(speed) + abs(before) + abs(rate) + abs(gap) / dt, self.joints[n[0]].name)
 
     def moves(self, b, dt, loads, lates, x, q, end):
         """Balances of a body over a sub-step; from x and q, where corrections have placed it, to its end."""
@@ -474,10 +475,9 @@ def main(files):
         try:
             judge.run(file)
         except (Damaged, OSError, ArithmeticError, LookupError, ValueError, AttributeError, TypeError) as why:
-            words = {LookupError: "a line names what is not told", ArithmeticError: "numbers beyond all bounds", ValueError: "numbers that are none",
-                     AttributeError: "a state is missing", TypeError: "a state is missing"}
-            what = next((f" (block of line {judge.line}) {text}:" for kind, text in words.items() if isinstance(why, kind)), "")
-            print(f"{file}: cannot be judged:{what} {why}")
+            what = {KeyError: "what it names is not told: ", AttributeError: "a state is missing: ", TypeError: "a state is missing: "}.get(
+                type(why), "numbers that are none, or beyond bounds: ")
+            print(f"{file}: cannot be judged: {why if isinstance(why, (Damaged, OSError)) else f'block of line {judge.line}: {what}{why}'}")
             worst = 2
             continue
         for fault in judge.faults[:10]:
