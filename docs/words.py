@@ -6,8 +6,8 @@
 Markdown: no sentence above 35 words, no paragraph above 120, no link to a file or heading that does not exist, no
 section or equation of a method that its paper lacks, no phrase that the glossary replaces, no document above its
 length. Sources (a folder: all below it), scripts, scenes and programs in documents: no comment line that begins with
-Of, What or Where. Sources: no such phrase in a comment, and sections and equations of a method that its paper has; in
-public headers no sentence above 35 words.
+Of, What or Where. Sources: no such phrase in a comment or, outside of tests, a string, and sections and equations of a
+method that its paper has; in public headers no sentence above 35 words.
 """
 import pathlib
 import re
@@ -26,6 +26,7 @@ REMARK = re.compile(r"//.*|/\*.*|(?:^|\s)#(?!\s*(?:include|define|undef|if|el|en
 PAPERS = {"linalg": "projection", "ida_projection": "projection", "contact": "contact", "scene": "events"}
 REFERENCE = re.compile(r"(\b[Mm]ethod|\b[Dd]etection|(?<=docs/method/)\w+)(?:\.md)?, (section|eq)s?[. ]+(\d+(?:\.\d+)?(?:, \d+)*)")
 GUIDE = re.compile(r"(?:\b(\w+)/)?README(?:\.md)?, section (\d+)")
+STRING = re.compile(r'"((?:\\.|[^"\\])*)"')
 COMMENT = re.compile(r"^\s*(?://+[!<]*|#|!)\s*(Of|What|Where)\b")
 
 
@@ -151,12 +152,15 @@ def check_source(path, replaced):
     for number, line in enumerate(lines, 1):
         if COMMENT.match(line):
             yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
+        if path == pathlib.Path(__file__).resolve():
+            break
         remark = REMARK.search(line)
-        if not remark or path == pathlib.Path(__file__).resolve():
-            continue
+        said = " ".join([remark.group() if remark else ""] + (STRING.findall(line) if room != "tests" else []))
         for phrase, instead in replaced:
-            if re.search(rf"\b{re.escape(phrase)}\b", remark.group(), re.I):
+            if re.search(rf"\b{re.escape(phrase)}\b", said, re.I):
                 yield f"{path}:{number}: say \"{instead}\", not \"{phrase}\""
+        if not remark:
+            continue
         more = re.match(r"\s*//+ (.*)", lines[number]) if remark.group().endswith(",") and number < len(lines) else None
         cited = remark.group() + (" " + more.group(1) if more else "")
         for place, kind, numbers in REFERENCE.findall(cited):

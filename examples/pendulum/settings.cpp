@@ -19,7 +19,7 @@ std::optional<int> parse(int argc, char** argv, Settings& settings) {
   const CLI::Option* long_given =
       app.add_flag("--long,!--no-long", settings.long_runs, "Runs of 1000 s as well; the default");
   app.add_flag("--quick", settings.quick,
-               "A look in a second: 1e-4, 1e-6 and 1e-8, timed once, no long runs");
+               "Takes a second: 1e-4, 1e-6 and 1e-8, timed once, no long runs");
   app.add_option("--output", settings.output, "Folder of the CSV and SVG files; default: output");
   try {
     app.parse(argc, argv);

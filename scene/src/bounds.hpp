@@ -13,7 +13,7 @@ constexpr std::size_t kLargestScene = std::size_t{256} << 20, kLargestPart = std
 /// Bytes of a wrong value that its message shows.
 constexpr std::size_t kLongestShown = 60;
 /// Things of one kind that are told one by one.
-constexpr std::size_t kTold = 5;
+constexpr std::size_t kMostNamed = 5;
 /// Bodies that have columns in a table.
 constexpr std::size_t kMostInColumns = 200;
 /// Bodies beyond which pictures leave something out.

@@ -106,7 +106,7 @@ TEST_CASE("the plan chooses the engine and counts") {
   const Plan both = plan(kTouching + kBall);
   CHECK(both.engine == EngineKind::stepping);
   CHECK(both.rows == 3);
-  CHECK(both.why == "bodies touch; it has joints, too; steps in parts within an accuracy of 0.001");
+  CHECK(both.why == "bodies touch; it has joints, too; sub-steps within an accuracy of 0.001");
   CHECK(plan("[stepping]\n" + kSphere + kHinge).engine == EngineKind::stepping);
 }
 

@@ -159,13 +159,13 @@ TEST_CASE("what is no number is never met") {
   for (int component = 0; component < 3; ++component) {
     Judge judge(scene);
     Still engine;
-    judge.look(0.2, true, engine, 0);
+    judge.judge(0.2, true, engine, 0);
     engine.bodies_[0].position[component] = nan;
     engine.bodies_[0].orientation.coeffs()[component] = nan;
     engine.d.kinetic_energy = engine.d.drift = nan;
-    judge.look(0.5, true, engine, 0);
+    judge.judge(0.5, true, engine, 0);
     const Still well;
-    judge.look(1, true, well, 0);  // and right again at the end
+    judge.judge(1, true, well, 0);  // and right again at the end
     for (const Judgement& j : judge.judgements()) {
       CHECK(j.judged);
       CHECK_FALSE(j.met);

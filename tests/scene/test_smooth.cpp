@@ -259,7 +259,7 @@ TEST_CASE("smooth: a run that ends at a dead point names the joints that depend 
   const std::string text =
       tether::test::thrown<SimulationError>([&] { make_smooth_engine(taut)->advance(0.5); });
   INFO(text);
-  CHECK(contains(text, "dead point"));
+  CHECK(contains(text, "singular position"));
   CHECK(contains(text, "\"left\""));
   CHECK(contains(text, "\"right\""));
   CHECK_FALSE(contains(text, "\"beside\""));

@@ -60,7 +60,7 @@ Status Automatic::rotate(Search& search, int most_idle) {
   prepare();
   sweeps_.start(search.best.data());
   const bool regular = is_regular(search.system);
-  if (!interior_.ordered()) look_for_bodies(search);
+  if (!interior_.ordered()) find_bodies(search);
   if (search.confirmed()) return Status::solved;
   if (search.exhausted()) return Status::work_limit;
   const bool by_bodies = regular && interior_.order_bodies(search);
@@ -137,7 +137,7 @@ Status Automatic::run(Search& search) {
 }
 
 // Sweeps may solve the problem before it pays to look for bodies behind its matrix.
-void Automatic::look_for_bodies(Search& search) {
+void Automatic::find_bodies(Search& search) {
   const double price = search.system.price_of_bodies();
   if (search.system.body_form() != nullptr || price > interior_.cost(search) ||
       !search.system.may_have_bodies())

@@ -25,7 +25,7 @@ class Automatic {
   void prepare();
   Status rotate(Search& search, int most_idle);
   bool sweep(Search& search, bool first, bool by_bodies);
-  void look_for_bodies(Search& search);
+  void find_bodies(Search& search);
   bool order_after_sweeps(Search& search);
   void sweep_and_solve_parts(Search& search, double until);
   void proximal_path(Search& search);

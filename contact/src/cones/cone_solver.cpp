@@ -105,7 +105,7 @@ ConeSolution ConeSolver::Implementation::solve(const ConeProblem& problem,
                      ? "block " + std::to_string(out.blocked.front()) +
                            " approaches, but free rows hold its normal: no impulse stops it"
                      : "free row " + std::to_string(out.contradicting.front()) +
-                           " contradicts others: look at `contradicting`";
+                           " contradicts others: see `contradicting`";
   } else if (out.error <= options.tolerance) {
     out.status = Status::solved;
     out.advice.clear();

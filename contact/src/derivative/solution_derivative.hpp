@@ -1,5 +1,5 @@
 // Tether: implicit differentiation of a solution, in terms of what the data do to each contact
-// (method, eq. 30). SPDX-License-Identifier: BSD-3-Clause
+// (method, eq. 31). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <array>

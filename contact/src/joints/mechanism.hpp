@@ -1,4 +1,4 @@
-// Tether: bodies that joints connect (method, eq. 29). SPDX-License-Identifier: BSD-3-Clause
+// Tether: bodies that joints connect (method, eq. 30). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/contact/joints.hpp>

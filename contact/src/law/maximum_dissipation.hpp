@@ -93,7 +93,7 @@ struct MaximumDissipation {
   }
 
   // Far out on a hyperbola the angle says little about the radius. There y = c0 + p s + q / s,
-  // s >= 1, with p and q along the asymptotes, and dE/ds is almost linear (method, eq. 11).
+  // s >= 1, with p and q along the asymptotes, and dE/ds is almost linear (method, section 2.3).
   static Regime near_asymptote(const LocalBlock& L, const LocalRhs& r, double y0, double y1,
                                double* x);
 

@@ -131,7 +131,7 @@ ConsistencyReport Projection::Impl::project_start(double t0, N_Vector y, N_Vecto
   if (!probed)
     throw NoStart{Status::internal_error,
                   "IDA could not be started at the given values; set tolerances and the linear "
-                  "solver before make_consistent, and look at IDA's own message"};
+                  "solver before make_consistent, and read IDA's own message"};
   if (corrector_.stopped()) throw NoStart{Status::callback_fatal, corrector_.stop_text()};
   *jointly = joint.report.status != Status::unused;
   if (joint.report.status != Status::success)

@@ -234,7 +234,8 @@ void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, attempts_.left_before)) return;
   move.status = Status::move_too_long;
   movers_.used->rows().message = "the move onto the constraints, capped at " + brief(move.length) +
-                                 " tolerances (Options::largest_move), leaves " + brief(move.left) +
+                                 " tolerances (Advanced::largest_move), leaves " +
+                                 brief(move.left) +
                                  ", which the error test does not allow; use a larger largest_move";
 }
 

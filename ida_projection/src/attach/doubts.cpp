@@ -16,7 +16,7 @@ constexpr int kRefusedStarts = 5;  // failed error tests of the first step; IDA 
 
 }  // namespace
 
-// From a start off the constraints moves do not shrink with the step. Above Options::largest_move
+// From a start off the constraints moves do not shrink with the step. Above Advanced::largest_move
 // they are refused by name, below IDA's error test refuses them, with words of its own.
 void Projection::Impl::check_start(const Move& move) {
   if (attempts_.steps != 0) return;

@@ -243,7 +243,7 @@ class Projection::Impl {
   Metric wanted_metric_;
   MetricChoice metric_choice_;
   Run run_;
-  Inquiry* inquiry_ = nullptr;  // make_consistent() looks around
+  Inquiry* inquiry_ = nullptr;  // only while make_consistent() probes a start
   Busy busy_ = Busy::no;
   Attempts attempts_;
   Tally tally_;

@@ -87,7 +87,7 @@ template <class Fill>
 int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries,
                      Fill&& fill) {
   const std::ptrdiff_t count = part.set->count;
-  const bool check_jacobian_rows = C != nullptr && !part.C_looked_at;
+  const bool check_jacobian_rows = C != nullptr && !part.C_checked;
   double* const to =
       g != nullptr ? part.g_room.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
   double* into = C;
@@ -98,7 +98,7 @@ int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff
   const int flag = fill(to, into);
   if (g != nullptr && !part.g_room.end(g, count)) overrun_ = true;
   if (check_jacobian_rows && !C_room_.end(C, entries)) overrun_ = true;
-  part.C_looked_at |= check_jacobian_rows;
+  part.C_checked |= check_jacobian_rows;
   return overrun_ ? -1 : flag;
 }
 

@@ -99,7 +99,7 @@ class Evaluator {
     const SparseJacobian* sparse = std::get_if<SparseJacobian>(&set->jacobian);
     bool gives_both = (dense != nullptr && static_cast<bool>(dense->fill_with_value)) ||
                       (sparse != nullptr && static_cast<bool>(sparse->fill_with_value));
-    mutable bool C_looked_at = false;
+    mutable bool C_checked = false;
     mutable GuardedRoom g_room = {};
     /// How many entries of C it has, on n unknowns.
     std::ptrdiff_t entries(int n) const {

@@ -1,4 +1,4 @@
-// Tether: what stale factors of C leave of a move (method, section 10). SPDX-License-Identifier:
+// Tether: what stale factors of C leave of a move (method, section 3). SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 

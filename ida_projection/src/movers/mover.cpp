@@ -176,7 +176,7 @@ bool Mover::allowed(const Candidate& candidate, Move& result) {
     result.status = finite ? Status::move_too_long : Status::not_finite;
     rows_->message = "the move onto the constraints is " + brief(length) +
                      " tolerances long, the limit is " + brief(limit) +
-                     " (Options::largest_move); start closer with make_consistent, or use a "
+                     " (Advanced::largest_move); start closer with make_consistent, or use a "
                      "smaller step";
     return false;
   }

@@ -317,7 +317,7 @@ Status SensitivityCorrector::too_long(const Candidate& candidate, int k, double 
   if (length <= limit) return Status::success;
   message_ = "the move of sensitivity " + std::to_string(k) + " onto C s + dg/dp = 0 is " +
              brief(length) + " tolerances long, the limit is " + brief(limit) +
-             " (Options::largest_move); start with make_sensitivities_consistent, and check dg/dp";
+             " (Advanced::largest_move); start with make_sensitivities_consistent, and check dg/dp";
   return Status::move_too_long;
 }
 

@@ -36,7 +36,7 @@ class TangentRows : public Companion {
   virtual int rows() const = 0;
   /// g(t, y) itself, for differences in parameters.
   virtual Status value(double t, N_Vector y, double* g) = 0;
-  /// C(t, y); `weights`: reciprocal tolerances of y; `id` as in Mover::set_algebraic().
+  /// C(t, y); `weights`: reciprocal tolerances of y; `id` as in RowsAt::set_algebraic().
   virtual Status evaluate(double t, N_Vector y, N_Vector weights, N_Vector id) = 0;
   /// Its factors in the metric D, one entry for each component.
   virtual Status factor(N_Vector D) = 0;

@@ -49,7 +49,8 @@ std::string undetermined_multipliers(const Candidate& candidate, N_Vector y,
   return "F does not determine the algebraic variables " + listed(free) +
          ": its derivatives by them depend on each other" +
          (rows.empty() ? "" : ", as do the rows " + listed(rows)) +
-         "; at a dead point of a mechanism start beside it, joints that are there twice leave out";
+         "; start beside a singular position of a mechanism, and leave out joints that are given "
+         "twice";
 }
 
 }  // namespace tether::ida_projection

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kOffItsSet = 2.0;  // tolerances: F has moved a row so far off its set
 constexpr int kRefinements = 3;
-constexpr double kSettles = 0.01;   // change of the rate in the last of them, see look_into()
+constexpr double kSettles = 0.01;   // change of the rate in the last of them, see diagnose()
 constexpr double kAgree = 0.5;      // difference of two rates in a row
 constexpr double kRounding = 1e-9;  // of the terms: differences of g know no less
 constexpr double kConfirmed = 0.5;  // of it, by a better y'
@@ -97,7 +97,7 @@ std::string FirstSteps::find_false_rows(const Attempt& at, Mover& mover) {
     row.span += at.h;
     const double noticed = kOffItsSet * root * tangency_.tolerance[i];
     if (!(std::abs(row.sum) > row.limit * noticed) && row.suspected == 0.0) continue;
-    text = look_into(static_cast<int>(i), noticed, at);
+    text = diagnose(static_cast<int>(i), noticed, at);
     row.sum = row.span = 0.0;
     row.limit *= 2.0;  // what was noise is so again
     ++run_.checks;
@@ -138,7 +138,7 @@ bool FirstSteps::refine_slope(const Attempt& at) {
 }
 
 // Returns the fault of the row, or an empty text.
-std::string FirstSteps::look_into(int row, double noticed, const Attempt& at) {
+std::string FirstSteps::diagnose(int row, double noticed, const Attempt& at) {
   const auto i = static_cast<std::size_t>(row);
   const double t = at.step.t;
   const auto rate_along = [&](const std::vector<double>& y, const std::vector<double>& yp) {
@@ -167,7 +167,7 @@ std::string FirstSteps::look_into(int row, double noticed, const Attempt& at) {
   if (settled) of.verified += along * of.span;
   const double earlier = std::exchange(of.suspected, 0.0);
   if (settled && std::abs(of.verified) > kConfirmed * noticed) of.suspected = along;
-  // At a singular position F determines no y', whatever the sum: the next look decides.
+  // At a singular position F determines no y', whatever the sum: the next check decides.
   if (std::abs(earlier - of.suspected) < kAgree * std::abs(of.suspected)) {
     const std::string kink = may_search() ? faults_.kink(row, t, point_) : std::string();
     if (!kink.empty()) return kink;

@@ -45,7 +45,7 @@ class FirstSteps {
   struct Attempt {
     const Candidate& candidate;
     const StepData& step;
-    double h;  // since the last look
+    double h;  // since the last check
     N_Vector corrected;
     const double* id;
     Corrector& corrector;
@@ -53,13 +53,13 @@ class FirstSteps {
   struct Row {
     double sum = 0.0, span = 0.0;  // of C y' over time, and the time
     double verified = 0.0;         // what a better y' left of the sums so far
-    double suspected = 0.0;        // rate that verified them at the last look; 0: none did
+    double suspected = 0.0;        // rate that verified them at the last check; 0: none did
     double limit = 1.0;            // of the sum from which on it is verified
     int vanished = 0;              // steps in which its gradient was zero
   };
   struct Run {
     std::vector<Row> rows;
-    long checks = 0, last_check = kSettled;  // into doubts in rows; the steps at the last look
+    long checks = 0, last_check = kSettled;  // into doubts in rows; the steps at the last one
     int small_solutions = 0;                 // at a solution below its tolerances
     double largest = 0.0;                    // size of the solution so far, in tolerances
     bool false_row_found = false;
@@ -71,7 +71,7 @@ class FirstSteps {
   std::string find_false_rows(const Attempt& at, Mover& mover);
   std::string find_one_sided_row(double t);
   bool refine_slope(const Attempt& at);
-  std::string look_into(int row, double noticed, const Attempt& at);
+  std::string diagnose(int row, double noticed, const Attempt& at);
   bool may_search() const { return faults_.may_search(run_.searched + point_.size()); }
 
   const Constraints& constraints_;

@@ -223,7 +223,7 @@ void fold_massless(std::vector<Part>& parts, Remarks& remarks, Problems& problem
     if (part.fixed() || part.mass > 0 || !part.inertia.isZero(0)) continue;
     if (count[k] > 1) {
       problems.add(part.line, fmt::format("link \"{}\"", part.name), "",
-                   fmt::format("moves, has no mass, and {} links hang on it: give it mass and "
+                   fmt::format("moves, has no mass, and carries {} links: give it mass and "
                                "inertia",
                                count[k]));
       continue;

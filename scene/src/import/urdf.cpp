@@ -55,9 +55,9 @@ Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joint
     if (parent == index.end() || child == index.end()) continue;
     const UrdfJoint*& carrier = out.carrier[static_cast<std::size_t>(child->second)];
     if (carrier != nullptr) {
-      problems.add(
-          joint.line, path + "child", fmt::format("\"{}\"", joint.child),
-          fmt::format("hangs on joint \"{}\" already; closed loops are no URDF", carrier->name));
+      problems.add(joint.line, path + "child", fmt::format("\"{}\"", joint.child),
+                   fmt::format("is carried by joint \"{}\" already; closed loops are no URDF",
+                               carrier->name));
       continue;
     }
     carrier = &joint;

@@ -80,8 +80,8 @@ struct Asked {
 class Refusals {
  public:
   Refusals(const Scene& s, const Asked& asked, const std::string& no_event) {
-    look_at_frequencies(s);
-    look_at_engines(asked);
+    refuse_frequencies(s);
+    refuse_engines(asked);
     refuse(asked.event && !asked.then_steps && !no_event.empty(), no_event);
     refuse(
         asked.then_steps && asked.projected,
@@ -89,7 +89,7 @@ class Refusals {
         "project = false");
     if (!asked.stepping && !asked.then_steps &&
         (asked.event || asked.smooth || !(asked.contact || asked.laws)))
-      look_at_fast_loads(s);
+      refuse_fast_loads(s);
   }
   const std::string& text() const { return text_; }
 
@@ -97,7 +97,7 @@ class Refusals {
   void refuse(bool wrong, const std::string& line) {
     if (wrong) text_ += (text_.empty() ? "" : "\n") + line;
   }
-  void look_at_frequencies(const Scene& s) {
+  void refuse_frequencies(const Scene& s) {
     const auto resolves = [&](double frequency, const char* of) {
       refuse(
           !effects::is_resolved(frequency, s.end),
@@ -108,7 +108,7 @@ class Refusals {
     for (const Joint& joint : s.joints)
       if (joint.motion) resolves(joint.motion->frequency, "the motion of a joint");
   }
-  void look_at_engines(const Asked& a) {
+  void refuse_engines(const Asked& a) {
     refuse(a.smooth + a.stepping + a.event > 1,
            a.smooth && a.stepping && !a.event
                ? "the scene has options for both engines, [smooth] and [stepping]"
@@ -124,7 +124,7 @@ class Refusals {
            "contacts, use [smooth]");
   }
   // Engines whose steps resolve a load.
-  void look_at_fast_loads(const Scene& s) {
+  void refuse_fast_loads(const Scene& s) {
     for (const Load& load : s.loads) {
       if (!effects::pushes(load)) continue;
       const double steps = effects::kStepsOfPeriod * load.history->frequency * s.end;
@@ -172,7 +172,7 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
 // How steps are taken, after why there are any.
 std::string with_accuracy(const Scene& scene) {
   const double accuracy = scene.stepping.value_or(SteppingOptions{}).accuracy;
-  return accuracy > 0 ? fmt::format("; steps in parts within an accuracy of {:g}", accuracy) : "";
+  return accuracy > 0 ? fmt::format("; sub-steps within an accuracy of {:g}", accuracy) : "";
 }
 
 // Which engines could move the scene, too, or why not.

@@ -73,16 +73,16 @@ std::vector<std::string> overlaps_at_start(const Scene& scene) {
       deep.emplace_back(depth, pair);
   std::sort(deep.rbegin(), deep.rend());
   std::vector<std::string> out;
-  for (std::size_t k = 0; k < std::min(kTold, deep.size()); ++k) {
+  for (std::size_t k = 0; k < std::min(kMostNamed, deep.size()); ++k) {
     auto [one, other] = deep[k].second;
     if (body(one).fixed) std::swap(one, other);
     out.push_back(
         fmt::format("\"{}\" begins {:.3g} m inside \"{}\": pushing them apart does work on them",
                     body(one).name, deep[k].first, body(other).name));
   }
-  if (deep.size() > kTold)
+  if (deep.size() > kMostNamed)
     out.push_back(
-        fmt::format("{} more pairs of bodies begin inside each other", deep.size() - kTold));
+        fmt::format("{} more pairs of bodies begin inside each other", deep.size() - kMostNamed));
   return out;
 }
 

@@ -96,7 +96,7 @@ void print_events(const Summary& s, const Counts& c) {
 }
 
 void print_hand_overs(const Scene& scene, const RunResult& r) {
-  for (std::size_t k = 0; k < std::min(kTold, r.hand_overs.size()); ++k) {
+  for (std::size_t k = 0; k < std::min(kMostNamed, r.hand_overs.size()); ++k) {
     const HandOver& each = r.hand_overs[k];
     fmt::print(
         "  HANDED OVER  at {:.9g} s events could not go on; steps of {:g} s did{}: {}\n", each.time,
@@ -104,20 +104,20 @@ void print_hand_overs(const Scene& scene, const RunResult& r) {
         each.back ? fmt::format(" until {:.9g} s, and took {:.3g} J", *each.back, each.lost) : "",
         each.why);
   }
-  if (r.hand_overs.size() > kTold)
+  if (r.hand_overs.size() > kMostNamed)
     fmt::print("               and {} times more, the last time at {:.9g} s\n",
-               r.hand_overs.size() - kTold, r.hand_overs.back().time);
+               r.hand_overs.size() - kMostNamed, r.hand_overs.back().time);
 }
 
 void print_joint_events(const Scene& scene, const RunResult& r) {
-  for (std::size_t k = 0; k < std::min(kTold, r.joint_events.size()); ++k) {
+  for (std::size_t k = 0; k < std::min(kMostNamed, r.joint_events.size()); ++k) {
     const ContactEvent& each = r.joint_events[k];
     fmt::print("  {:<12} {} at {:.9g} s{}\n", name(each.kind),
                scene.joints[static_cast<std::size_t>(each.joint)].name, each.time,
                each.lost != 0 ? fmt::format(", its impulse takes {:.6g} J", each.lost) : "");
   }
-  if (r.joint_events.size() > kTold)
-    fmt::print("               and {} more\n", r.joint_events.size() - kTold);
+  if (r.joint_events.size() > kMostNamed)
+    fmt::print("               and {} more\n", r.joint_events.size() - kMostNamed);
 }
 
 void print_work(const Scene& scene, const Summary& s, const Counts& c) {
@@ -130,8 +130,8 @@ void print_work(const Scene& scene, const Summary& s, const Counts& c) {
       fmt::print("  accepted     {} contact problems above the tolerance; {} steps halved\n",
                  c.accepted, c.halved);
     if (const double accuracy = scene.stepping.value_or(SteppingOptions{}).accuracy; accuracy > 0)
-      fmt::print("  accuracy     {:g} of the size of each body: {} parts of steps refused\n",
-                 accuracy, c.error_test_failures);
+      fmt::print("  accuracy     {:g} of the size of each body: {} sub-steps refused\n", accuracy,
+                 c.error_test_failures);
   } else if (c.residual_evaluations > 0) {
     fmt::print("  drift        {:.2e} (largest violation of a joint or a kept invariant)\n",
                s.drift);
@@ -172,10 +172,11 @@ void print_start(const Scene& scene) {
     fmt::print("WARNING   {}\n", on_terminal(each));
   const std::vector<std::string> names = bodies_out_of_touch(scene);
   if (names.empty()) return;
-  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kTold, names.size()));
-  fmt::print("note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
-             fmt::join(names.begin(), end, ", "),
-             names.size() > kTold ? fmt::format(" and {} more", names.size() - kTold) : "");
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kMostNamed, names.size()));
+  fmt::print(
+      "note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
+      fmt::join(names.begin(), end, ", "),
+      names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
 }
 
 void print_times(const RunResult& r, double wall) {

@@ -186,7 +186,7 @@ Judge::Judge(const Scene& scene)
         scene.expect[i].time > scene.end && !same_time(scene.expect[i].time, scene.end);
 }
 
-void Judge::look(double event, bool record, const Engine& engine, double start_energy) {
+void Judge::judge(double event, bool record, const Engine& engine, double start_energy) {
   for (std::size_t i = 0; i < scene_.expect.size(); ++i) {
     const Expect& expect = scene_.expect[i];
     const bool due = same_time(expect.time, event);

@@ -31,7 +31,7 @@ class Judge {
   explicit Judge(const Scene& scene);
   /// At a time at which the run stops: `event` as planned, at or before engine.time(); `record`: it
   /// is one of those at which all that holds throughout is judged.
-  void look(double event, bool record, const Engine& engine, double start_energy);
+  void judge(double event, bool record, const Engine& engine, double start_energy);
   const std::vector<Judgement>& judgements() const { return judgements_; }
   void save(std::ostream& out) const;
   void restore(std::istream& in);

@@ -182,10 +182,10 @@ class Run {
 
   // A state is that of a run which goes on: what belongs to an end on the way comes after it.
   void stop(const Event& event) {
-    look();
+    diagnose();
     done_ = event.time;
     if (event.record || event.expect)
-      judge_.look(event.time, event.record, *engine_, summary().start_energy);
+      judge_.judge(event.time, event.record, *engine_, summary().start_energy);
     if (options_.record) options_.record(*engine_);
     if (event.record) record();
     if ((event.checkpoint || event.end) && !scene_.output["state"].empty())
@@ -194,11 +194,11 @@ class Run {
   }
 
   // Steps may be longer than the time between stops: no state is judged, or recorded, twice.
-  void look() {
-    if (looked_at_ == engine_->time()) return;
+  void diagnose() {
+    if (diagnosed_at_ == engine_->time()) return;
     diagnostics_ = engine_->diagnostics();
     demand_finite(diagnostics_);
-    looked_at_ = engine_->time();
+    diagnosed_at_ = engine_->time();
   }
 
   void record() {
@@ -368,7 +368,7 @@ class Run {
   Resume resume_;
   std::vector<std::unique_ptr<Recorder>> recorders_;
   Diagnostics diagnostics_;
-  std::optional<double> looked_at_;  // the time that they are of
+  std::optional<double> diagnosed_at_;  // the time that they are of
   std::uint64_t scene_hash_ = 0;
   double done_ = -1;  // the last event
   bool recorded_ = false, saved_ = false, is_over_ = false;

@@ -225,18 +225,19 @@ std::string Integrator::failure(int flag) const {
     message += "Projection: " + projection->message() + ". ";
   const std::vector<std::string> joints = system_.dependent_joints(t_, y().data());
   for (std::size_t k = 0; k < joints.size(); ++k) {
-    if (k == kTold) {
-      message += " and " + std::to_string(joints.size() - kTold) + " more";
+    if (k == kMostNamed) {
+      message += " and " + std::to_string(joints.size() - kMostNamed) + " more";
       break;
     }
     message += (k == 0 ? "Joints \"" : ", \"") + joints[k] + "\"";
   }
   if (!joints.empty())
     message +=
-        " depend on each other there, a dead point: they hold the bodies fast whatever pulls at "
+        " depend on each other there, at a singular position: they hold the bodies fast whatever "
+        "pulls at "
         "them, or let them go on in two ways. Move a body out of it a little. ";
   message +=
-      "Try a smaller [smooth] tolerance or max_step; look whether the joints let the bodies reach "
+      "Try a smaller [smooth] tolerance or max_step; check whether the joints let the bodies reach "
       "a position from which they cannot go on, and whether a spring or a motion is too stiff or "
       "too fast.";
   if (projection == nullptr)

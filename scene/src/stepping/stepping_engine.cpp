@@ -95,7 +95,7 @@ void exchange(Archive& io, int bodies, StepperMemory& m) {
   StepperMemory::Control& control = m.control;
   io(control.next, control.last, control.error, control.length);
   demand_not_negative({control.next, control.last, control.error, control.length},
-                      "no part of a step is so long");
+                      "no sub-step is so long");
   io(m.drift, m.vibration.frequency, m.vibration.acceleration);
   demand_not_negative({m.drift}, "joints are off by no length");
   demand_not_negative({m.vibration.frequency, m.vibration.acceleration},

@@ -391,7 +391,7 @@ TEST_CASE("a URDF that is wrong is refused with the line of the element") {
           "loop");
   refused("<robot><link name='a'/><link name='b'/><link name='c'/>" + fixed("j", "a", "c") +
               fixed("k", "b", "c") + "</robot>",
-          "hangs on joint \"j\" already");
+          "is carried by joint \"j\" already");
   refused("<robot><link name='a'/><link name='b'/><link name='c'/>" + fixed("j", "a", "b") +
               fixed("j", "a", "c") + "</robot>",
           "joint \"j\": name: another joint");

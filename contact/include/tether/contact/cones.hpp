@@ -116,7 +116,7 @@ class ConeProblem {
 };
 
 /// How far impulses are from the law, block by block, without units: the error in velocity of each
-/// row times row_scale(), over the largest that a block of its island needs (method, section 8).
+/// row times row_scale(), over the largest that a block of its island needs (method, section 3.1).
 struct ConeResiduals {
   double error = Residuals::kNone;  ///< the largest
   int worst = -1;                   ///< the block that has it

@@ -86,7 +86,7 @@ struct SolutionDirection {
 /// present regimes. These are dx = 0 (open), dw = 0 (sticking), and dw_n = 0, |x_t| = mu x_n and
 /// the law's direction of slip (sliding), in scaled units one sparse matrix
 ///
-///     M y = r,   M = P + Q A     (method, eq. 30)
+///     M y = r,   M = P + Q A     (method, eq. 31)
 ///
 /// that is factored once, each island by itself. Up to 100 touching contacts it is a complete
 /// orthogonal decomposition, beyond a sparse LU. Where that is singular the former up to 400, then

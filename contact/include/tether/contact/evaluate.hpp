@@ -24,7 +24,7 @@ struct Residuals {
   double natural_map = kNone;  ///< |x - P_K(x - w - De Saxce term)| / max(|b|, |x|, |w|)
 };
 
-/// The same yardstick for every solver. natural_map is the law's own (method, section 3); for
+/// The same yardstick for every solver. natural_map is the law's own (method, eq. 21); for
 /// Law::coulomb it is the one that Siconos reports. `impulses` has dimension * contacts entries;
 /// if one of them is not finite, all is NaN.
 Residuals evaluate(const Problem& problem, Law law, const linalg::VectorView& impulses);

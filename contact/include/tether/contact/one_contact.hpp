@@ -75,7 +75,7 @@ struct OneContact {
   int evaluations = 0;                                ///< of the scalar equation
 };
 
-/// The same, cold, from A, b and mu.
+/// The same from zero, for A, b and mu. Throws as LocalBlock does, and unless b is finite.
 OneContact solve_one(Law law, const Eigen::Matrix3d& A, const Eigen::Vector3d& b, double mu);
 
 }  // namespace tether::contact

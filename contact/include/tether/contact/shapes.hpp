@@ -62,7 +62,7 @@ struct Shape {
   static Shape ellipsoid(const Eigen::Vector3d& half_axes);
   /// Solid, with flat ends.
   static Shape cylinder(double radius, double length);
-  /// A surface of triangles, on bodies that are fixed (detection, 4).
+  /// A surface of triangles, on bodies that are fixed (detection, section 4).
   static Shape mesh(std::vector<Eigen::Vector3d> vertices,
                     std::vector<std::array<int, 3>> triangles);
   /// The mesh of heights[k nx + i] above (i dx, k dy): at least two in each direction. Throws

@@ -18,7 +18,7 @@
 TETHER_EXPORT_BEGIN
 namespace tether::contact {
 
-/// How the angular velocity of a body without torque changes (method, section 7). Spheres skip it.
+/// How the angular velocity of a body without torque changes (method, eq. 29). Spheres skip it.
 enum class Gyroscopic : std::uint8_t {
   none,           ///< not at all: keeps energy, never flips
   explicit_step,  ///< w += -dt I^-1 (w x I w)
@@ -33,7 +33,7 @@ inline constexpr std::array<Gyroscopic, 4> kGyroscopics{
 /// The enumerator as text.
 const char* name(Gyroscopic gyroscopic);
 
-/// Law of restitution at impacts (method, section 7).
+/// Law of restitution at impacts (method, section 7.2).
 enum class RestitutionLaw : std::uint8_t {
   /// Normal velocities: w_n+ + e w_n- >= 0 complementary to x_n, together with friction in one
   /// solve.
@@ -134,9 +134,9 @@ struct SteppingOptions {
   /// BodyOptions::tolerance of the contact problems.
   double tolerance = 1e-9;
   /// A contact problem that ends above the tolerance is used, and counted as `accepted`, if its
-  /// residual is at most min(acceptance * tolerance, 1e-2) (method, section 7). Below 1e-6 the
-  /// solver stops after 3/4 of max_work. 1: nothing above the tolerance
-  /// is accepted.
+  /// residual is at most min(acceptance * tolerance, 1e-2). With an acceptance above 1 a solve ends
+  /// at a residual below 1e-6 once 3/4 of max_work are spent. 1: nothing above the tolerance is
+  /// accepted.
   double acceptance = 1;
   /// A step whose problem is not accepted is repeated as two halves, each of these as two quarters,
   /// and so on, at most this many times. The shortest sub-steps, and those with an impact (which a

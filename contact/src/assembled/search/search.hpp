@@ -11,7 +11,7 @@ namespace tether::contact::detail {
 // so long sums are not spent on their points.
 enum class By { sweeps, factors };
 
-// Stages improve the same best point; none may overwrite it by a worse one (method, section 3).
+// Stages improve the same best point; none may overwrite it by a worse one (method, section 10).
 // All decisions use residuals and operation counts, never the clock.
 struct Search {
   System system;

@@ -38,7 +38,7 @@ class System {
 
   // After reset() with some contacts of `whole`: takes over its laws and velocity scales.
   void belong_to(const System& whole, const int* contacts);
-  // And its shares of bodies (method, 3.1), which blocks of zeros in `whole` change.
+  // And its shares of bodies (method, section 3.1), which blocks of zeros in `whole` change.
   void share_as(const System& whole, const int* contacts);
 
   // The problem that stages solve: the given one, or the same in units without overflow.

@@ -9,7 +9,7 @@ namespace tether::contact::detail {
 
 // Outer: x^{k+1} = solution of the problem with A + tau D and b + tau D x^k (D: diagonal blocks).
 // Inner: Newton on F = x - Phi(D x - w), whose matrix I + Phi' (A - D) is regular by
-// the proximal term although A is not (method, eq. 17). It is factorised by contacts, those that
+// the proximal term although A is not (method, eq. 18). It is factorised by contacts, those that
 // part left out, or by bodies where these have so many contacts that it costs less.
 class ProximalNewton {
  public:

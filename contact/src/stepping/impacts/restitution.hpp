@@ -13,7 +13,7 @@ namespace tether::contact::detail {
 /// The same without the impulses of the problem before.
 BodyOptions cold(BodyOptions options);
 
-/// Restitution (method, eq. 27). `newton`: bouncing contacts leave with epsilon times their speed
+/// Restitution (method, eq. 28). `newton`: bouncing contacts leave with epsilon times their speed
 /// of approach, in one solve with friction. `poisson`: the contact problem without restitution
 /// gives impulses x; epsilon x is added at bouncing contacts; then the contact problem is solved
 /// once more. In both, the change by restitution is scaled down in islands that would gain more

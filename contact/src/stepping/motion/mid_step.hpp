@@ -1,4 +1,4 @@
-// Tether: contacts in the middle of a step (method, section 7.1). SPDX-License-Identifier:
+// Tether: contacts in the middle of a step (method, eq. 27). SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 

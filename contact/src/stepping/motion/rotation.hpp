@@ -1,4 +1,4 @@
-// Tether: rotation of one rigid body over one step (method, eq. 28). SPDX-License-Identifier:
+// Tether: rotation of one rigid body over one step (method, eq. 29). SPDX-License-Identifier:
 // BSD-3-Clause
 #pragma once
 

@@ -27,7 +27,7 @@ enum class Metric {
   automatic,
 };
 
-/// The consequence of a move that is longer than Options::largest_move allows.
+/// The consequence of a move that is longer than Advanced::largest_move allows.
 enum class LongMove {
   reject,  ///< recoverable failure: IDA retries with a smaller step
   cap,     ///< scale the move down to the allowed length, as DASSLX does; a failure as above if the

@@ -20,20 +20,20 @@ struct Statistics {
   long joint_evaluations = 0;     ///< of both: g and C by one call, where rows have such a function
   long factorizations = 0;        ///< of C in the metric, with a decision on its rank
   long refactorizations = 0;      ///< of the rows that an earlier one has kept
-  long extra_iterations = 0;      ///< corrector iterations added
+  long extra_iterations = 0;      ///< polishes that changed differential variables
   long corrections_repeated =
       0;               ///< corrections redone with a new Jacobian: the stale one misled IDA
-  long refreshes = 0;  ///< refreshes of the algebraic variables
+  long refreshes = 0;  ///< polishes that changed algebraic variables
   long residual_evaluations = 0;  ///< F called by the plugin itself (also in IDA's own count)
   long rank_drops = 0;            ///< factorisations that dropped redundant rows
   long untested = 0;  ///< algebraic variables out of IDA's error test, see suppress_algebraic
-  long smoothing_begun = 0;          ///< runs in which Options::smooth_where_needed acted
-  long order_limited = 0;            ///< times that Options::limit_order acted
+  long smoothing_begun = 0;          ///< runs in which Advanced::smooth_where_needed acted
+  long order_limited = 0;            ///< times that Advanced::limit_order acted
   long sensitivity_projections = 0;  ///< steps (attempts) whose sensitivities were projected
 
   // Failures by kind; each makes IDA retry with a smaller step unless noted.
   long not_converged = 0;         ///< too many moves, stagnation or divergence
-  long move_too_long = 0;         ///< longer than Options::largest_move (rejected)
+  long move_too_long = 0;         ///< longer than Advanced::largest_move (rejected)
   long moves_capped = 0;          ///< shortened by LongMove::cap; not a failure
   long inconsistent = 0;          ///< rows contradict each other
   long not_finite = 0;            ///< NaN or infinity in g, C or y

@@ -49,8 +49,8 @@ TETHER_INLINE double slip(double w0, double w1, double g0, double g1) {
   return std::sqrt(ww);
 }
 
-/// v <- P_K(x - w - (mu s, s gamma)), s = slip(w_t, gamma): x solves the law where v = x (method,
-/// section 3). Three entries each.
+/// v <- P_K(x - w - (mu s, s gamma)), s = slip(w_t, gamma): x solves the law where v = x
+/// (docs/method/contact.md, eq. 21). Three entries each.
 TETHER_INLINE void cone_natural_point(double mu, double g0, double g1, const double* x,
                                       const double* w, double* v) {
   const double s = slip(w[1], w[2], g0, g1);

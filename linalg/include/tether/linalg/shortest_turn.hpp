@@ -7,9 +7,9 @@
 namespace tether::linalg {
 
 /// The shortest rotation that takes the direction of `from` to that of `to`; neither is zero. Of
-/// opposite ones it is half a turn, of UnitZ about UnitX. Eigen's FromTwoVectors compiles a
-/// singular value decomposition (five seconds in each source) and is up to 1e-4 off where they are
-/// nearly opposite.
+/// opposite ones it is half a turn, of UnitZ about UnitX. Eigen's FromTwoVectors is up to 1e-4 off
+/// where they are nearly opposite, and compiles a singular value decomposition in each source that
+/// calls it.
 inline Eigen::Quaterniond shortest_turn(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized(), b = to.normalized();
   const double cosine = b.dot(a);

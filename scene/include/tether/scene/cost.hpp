@@ -16,8 +16,8 @@ namespace tether::scene {
 /// An engine and what is set of it: the tolerance of [smooth] or [event], or `step` (s) or
 /// `accuracy` of [stepping].
 enum class CostMethod : std::uint8_t { smooth, events, steps, accuracy };
-const char* name(CostMethod method);          ///< "events"
-const char* setting_name(CostMethod method);  ///< "tolerance"
+const char* name(CostMethod method);          ///< its word in tables, such as "events"
+const char* setting_name(CostMethod method);  ///< of its setting, such as "tolerance"
 
 /// One setting of a scene.
 struct CostRow {

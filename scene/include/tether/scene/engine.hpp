@@ -118,7 +118,7 @@ struct Counts {
   /// hit.
   long events = 0, impacts = 0;
 
-  /// f(each number).
+  /// Calls f with each number, by reference.
   template <class F>
   void each(const F& f) {
     for (long* n :

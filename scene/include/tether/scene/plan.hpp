@@ -22,7 +22,7 @@ struct Effect {
 /// Exactly what the scene names is on. Sizes that do not apply are zero.
 struct Plan {
   EngineKind engine = EngineKind::smooth;  ///< that moves the scene
-  std::string why;                         ///< the engine
+  std::string why;                         ///< the reason for this engine
   std::string no_event;                    ///< why the event engine cannot move it; empty: it can
   double then_steps = 0;        ///< s; > 0: of the steps that take over where events cannot go on
   std::vector<Effect> effects;  ///< all that act

@@ -167,7 +167,7 @@ enum class OnFailure : std::uint8_t { stop, warn };
 
 /// Scenes without contact: IDA with projection.
 struct SmoothOptions {
-  double tolerance = 1e-6;  ///< of the motion (SI); IDA's rtol and atol are a tenth of it
+  double tolerance = 1e-6;  ///< of the motion (SI); IDA's own are at most a tenth of it
   Formulation formulation = Formulation::index1;  ///< of the equations of motion
   bool projection = true;                         ///< false: plain IDA
   double max_step = 0;                            ///< s; 0: free

@@ -196,7 +196,7 @@ std::vector<FeaturePair> potential_contacts(const Scene& scene) {
         }
       if (out.size() > kMostContacts)
         throw std::invalid_argument(fmt::format(
-            "the event engine looks at every potential contact in every step; here are more than "
+            "the event engine checks every potential contact in every step; here are more than "
             "{}: use [stepping]",
             kMostContacts));
     }

@@ -269,7 +269,7 @@ ContactRows::ContactRows(Model& model, std::vector<int> contacts)
     model.joints(g, G_, rate, joint_rest_);
     MG_ = G_.transpose();
     model.divide_by_mass(MG_);
-    look_at_joints();
+    factor_joints();
     // With the forces of the joints: A = F' M^-1 F is never indefinite, and light bodies, whose
     // parts cancel in L P L', leave no rounding in it.
     const MatrixXd F = L_.transpose() - G_.transpose() * joint_solve(G_ * PL_);
@@ -348,7 +348,7 @@ void ContactRows::free_held() {
 }
 
 // Rows of unit length: whether one depends on others does not depend on masses.
-void ContactRows::look_at_joints() {
+void ContactRows::factor_joints() {
   scale_.setOnes(G_.rows());
   for (int i = 0; i < G_.rows(); ++i) {
     const double square = G_.row(i).dot(MG_.col(i));

@@ -33,7 +33,7 @@ class ContactRows {
 
  private:
   void take_rows();
-  void look_at_joints();
+  void factor_joints();
   void free_held();
   MatrixXd joint_solve(const MatrixXd& right) const;  ///< (G M^-1 G')^+ right
 

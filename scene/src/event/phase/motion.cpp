@@ -12,9 +12,9 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kWeakened = 0.3;
-constexpr double kAhead = 1e-5;                         // s in the units of the model
-constexpr double kHeld = 1e-9;                          // of the accelerations
-constexpr double kFactorisation = 4, kLookWork = 1000;  // operations
+constexpr double kAhead = 1e-5;                           // s in the units of the model
+constexpr double kHeld = 1e-9;                            // of the accelerations
+constexpr double kFactorisation = 4, kGatherWork = 1000;  // operations
 constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
 
 }  // namespace
@@ -160,7 +160,7 @@ void Motion::choose_joints() {
 bool Motion::other_joint_rows_are_better(double t, const VectorXd& y) {
   if (joints_ == model_.joint_rows()) return false;
   set(t, y.data());
-  look_at_joints();
+  evaluate_joints();
   const double now = RowChoice(joint_W_.topRows(joints_).transpose()).least;
   if (now > kWeakened * least_joint_row_) return false;
   least_joint_row_ = std::min(least_joint_row_, now);
@@ -169,7 +169,7 @@ bool Motion::other_joint_rows_are_better(double t, const VectorXd& y) {
 }
 
 // Those in use, first.
-void Motion::look_at_joints() {
+void Motion::evaluate_joints() {
   model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
   for (int k = 0; k < joints_; ++k) {
     const int from = joints_in_use_[index(k)];
@@ -184,7 +184,7 @@ void Motion::look_at_joints() {
 // Rows, columns and what is left of the second derivatives, at the state that is set.
 void Motion::gather() {
   if (joints_ > 0) {
-    look_at_joints();
+    evaluate_joints();
     R_.topRows(joints_) = joint_W_.topRows(joints_);
     C_.leftCols(joints_) = joint_W_.topRows(joints_).transpose();
     r_.head(joints_) = joint_rest_.head(joints_);
@@ -254,7 +254,7 @@ int Motion::choose_rows() {
 void Motion::prepare(double t, const double* y) {
   set(t, y);
   gather();
-  work_done_ += kLookWork * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
+  work_done_ += kGatherWork * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
   model_.forces(h_);
   for (std::size_t k = 0; k < closed_.size(); ++k)
     if (is_bounded(k) && !sticks(k))

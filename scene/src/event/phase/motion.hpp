@@ -183,7 +183,7 @@ class Motion {
                               Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   int choose_rows();
   void choose_joints();
-  void look_at_joints();
+  void evaluate_joints();
 
   Model& model_;
   Bands bands_;

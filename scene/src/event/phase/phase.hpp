@@ -1,4 +1,4 @@
-// Tether: one smooth phase in the hands of IDA and the projection (method, eq. 5).
+// Tether: one smooth phase in the hands of IDA and the projection (method, eq. 3).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 

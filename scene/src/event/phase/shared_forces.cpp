@@ -74,7 +74,7 @@ class HeldRows {
   }
 
   /// Whether other forces hold the rows as well.
-  void look_for_others() {
+  void find_other_forces() {
     if (empty()) return;
     linalg::PivotedQr of_rows(kDependent);
     of_rows.factor(S_.transpose());
@@ -258,7 +258,7 @@ SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes) {
   for (int pass = 0; pass < kTurns; ++pass) {
     HeldRows rows(problem, regimes);
     const bool held = rows.solve();
-    rows.look_for_others();
+    rows.find_other_forces();
     out.several = rows.several();
     if (!held || !out.several || !rows.resists() || !rows.move_into_cones()) return out;
     out.x = rows.forces();

@@ -144,7 +144,7 @@ void add_cost_command(CLI::App& app, int* status) {
       ->delimiter(',');
   command
       ->add_option("--accuracies", a->accuracies,
-                   "Accuracies of steps in parts, each or as a range [1e-2:1e-5]")
+                   "Accuracies of steps, each or as a range [1e-2:1e-5]")
       ->delimiter(',');
   command
       ->add_option("--reference", a->reference,

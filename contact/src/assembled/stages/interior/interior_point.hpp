@@ -9,7 +9,7 @@ namespace tether::contact::detail {
 
 // Follows x o u = nu e, nu -> 0, for x in K and u = w + s (mu, gamma) in K*, w = A x - b. With
 // s = s(u) the velocity w is an explicit function of u, so that one Newton matrix holds the law as
-// well; it is regular for every rank of A (method, eq. 23).
+// well; it is regular for every rank of A (method, eq. 24).
 class InteriorPoint {
  public:
   void reset(int contacts);
