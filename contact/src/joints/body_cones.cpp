@@ -27,6 +27,7 @@ BodyCone::Column speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
   BodyCone::Column w = c.bias;
   if (c.first >= 0) w += c.J1 * v[at(c.first)];
   if (c.second >= 0) w += c.J2 * v[at(c.second)];
+  for (const auto& [body, J] : c.others) w += J * v[at(body)];
   return w;
 }
 
@@ -35,6 +36,7 @@ BodyCone::Column largest_speeds(const BodyCone& c, const std::vector<Vector6d>& 
   BodyCone::Column w = c.bias.cwiseAbs();
   if (c.first >= 0) w += c.J1.cwiseAbs() * v[at(c.first)].cwiseAbs();
   if (c.second >= 0) w += c.J2.cwiseAbs() * v[at(c.second)].cwiseAbs();
+  for (const auto& [body, J] : c.others) w += J.cwiseAbs() * v[at(body)].cwiseAbs();
   return w;
 }
 
@@ -76,13 +78,20 @@ void BodyCones::find_islands(const Mechanisms& mechanisms, const std::vector<Bod
   const int n = static_cast<int>(cones.size()), nodes = mechanisms.count() + mechanisms.bodies();
   sets_.reset(nodes);
   const auto moving = [&](int body) { return body >= 0 && mechanisms.moves(body); };
-  for (const BodyCone& c : cones)
-    if (moving(c.first) && moving(c.second))
-      sets_.join(node_of(mechanisms, c.first), node_of(mechanisms, c.second));
-  const auto root = [&](int i) {
-    const BodyCone& c = cones[at(i)];
-    return sets_.root(node_of(mechanisms, moving(c.first) ? c.first : c.second));
+  const auto mover = [&](const BodyCone& c) {
+    if (moving(c.first)) return c.first;
+    for (const auto& [body, J] : c.others)
+      if (moving(body)) return body;
+    return c.second;
   };
+  const auto join = [&](const BodyCone& c, int body) {
+    if (moving(body)) sets_.join(node_of(mechanisms, mover(c)), node_of(mechanisms, body));
+  };
+  for (const BodyCone& c : cones) {
+    join(c, c.second);
+    for (const auto& other : c.others) join(c, other.first);
+  }
+  const auto root = [&](int i) { return sets_.root(node_of(mechanisms, mover(cones[at(i)]))); };
   first_of_.assign(at(nodes), n);
   for (int i = n - 1; i >= 0; --i) first_of_[at(root(i))] = i;
   const auto island = [&](int i) { return first_of_[at(root(i))]; };
@@ -103,12 +112,15 @@ void BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<Bo
   for (std::size_t l = 0; l < members_.size(); ++l) {
     const BodyCone& c = cones[at(members_[l])];
     alone_.emplace_back(BodyCone::Column::Zero(c.cone.rows));
-    for (const int body : {c.first, c.second}) {
-      if (body < 0 || !mechanisms.moves(body)) continue;
-      const BodyCone::Rows H = (body == c.first ? c.J1 : c.J2) * mechanisms.root(body);
+    const auto add_side = [&](int body, const BodyCone::Rows& J) {
+      if (body < 0 || !mechanisms.moves(body)) return;
+      const BodyCone::Rows H = J * mechanisms.root(body);
       sides_.push_back({static_cast<int>(l), body, node_of(mechanisms, body), H});
       alone_.back() += H.rowwise().squaredNorm();
-    }
+    };
+    add_side(c.first, c.J1);
+    add_side(c.second, c.J2);
+    for (const auto& [body, J] : c.others) add_side(body, J);
   }
   std::stable_sort(sides_.begin(), sides_.end(),
                    [](const Side& a, const Side& b) { return a.node < b.node; });

@@ -12,7 +12,7 @@
 
 namespace tether::contact::detail {
 
-/// One factor of the product, by its rows on two bodies: w = J1 v1 + J2 v2 + bias
+/// One factor of the product, by its rows on its bodies: w = J1 v1 + J2 v2 + ... + bias
 /// + compliance x.
 struct BodyCone {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 6, 6>;
@@ -24,6 +24,7 @@ struct BodyCone {
   Cone cone;
   int first = -1, second = -1;  ///< -1: the fixed world
   Rows J1, J2;
+  std::vector<std::pair<int, Rows>> others;  ///< more bodies, of laws
   Column bias;
   double compliance = 0;  ///< velocity over impulse, of every row
 };

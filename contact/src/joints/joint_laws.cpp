@@ -49,12 +49,6 @@ void JointLaws::add_sprung(int joint, double stretch, double stiffness, double d
   laws_.push_back({joint, false, 0, 0, rate, bound, stretch, stiffness, damping});
 }
 
-void JointLaws::on(int body, const Vector6d& G) {
-  const int row = rows_.count() - 1;
-  if (row >= 0 && body >= 0 && rows_.end(row) - rows_.begin(row) >= 2)
-    throw std::invalid_argument("joint " + std::to_string(rows_.joint(row)) +
-                                ": a law is between two bodies at most");
-  rows_.on(body, G);
-}
+void JointLaws::on(int body, const Vector6d& G) { rows_.on(body, G); }
 
 }  // namespace tether::contact

@@ -33,7 +33,8 @@ int LawRows::moving_along(int law) const {
 
 int LawRows::moving(int law, const Mechanisms& mechanisms) const {
   const JointRows::Term* t = laws.rows().begin(law);
-  return mechanisms.moves(t->body) ? t->body : t[1].body;
+  while (!mechanisms.moves(t->body)) ++t;
+  return t->body;
 }
 
 // A limit is struck if its gap closes within the step, and faster than the forces of one step could
@@ -77,9 +78,13 @@ BodyCone LawRows::cone(int law, LawUse use) const {
                                            : Cone::free());
   out.compliance = compliance_[at(law)];
   for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t) {
-    const bool first = t == laws.rows().begin(law);
-    (first ? out.first : out.second) = t->body;
-    (first ? out.J1 : out.J2).row(0) = t->G.transpose();
+    const auto place = t - laws.rows().begin(law);
+    if (place >= 2) {
+      out.others.emplace_back(t->body, t->G.transpose());
+      continue;
+    }
+    (place == 0 ? out.first : out.second) = t->body;
+    (place == 0 ? out.J1 : out.J2).row(0) = t->G.transpose();
   }
   out.bias[0] = use == LawUse::limits    ? std::max(each.gap, 0.0) / dt_
                 : use == LawUse::plastic ? plastic_bias_[at(law)]

@@ -111,10 +111,54 @@ void SubStepper::choose_bounces() {
 }
 
 void SubStepper::solve_problem() {
-  solver->solve(bodies.motion, turned, solution);
-  ++counts.contact_problems;
-  counts.sweeps += solution.sweeps;
-  counts.assembled_islands += solution.assembled_islands;
+  const bool holds = near && near->any_static();
+  if (holds) hold_all();
+  for (;;) {
+    solver->solve(bodies.motion, turned, solution);
+    ++counts.contact_problems;
+    counts.sweeps += solution.sweeps;
+    counts.assembled_islands += solution.assembled_islands;
+    if (!holds || !lets_slip()) return;
+    solver->take_back();
+  }
+}
+
+// By the coefficient of contacts that hold; impacts have the other one.
+void SubStepper::hold_all() {
+  const std::vector<Impact>& struck = impacts->list();
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < turned.size(); ++k) {
+    if (next < struck.size() && at(struck[next].contact) == k) {
+      ++next;
+      continue;
+    }
+    const Meeting& m = near->meeting(turned[k]);
+    turned[k].mu = contacts.points[k].mu = m.static_friction.value_or(turned[k].mu);
+  }
+}
+
+// Whether contacts that should hold slip, which have the other coefficient from here on. A slip is
+// one that is above the geometric mean of what friction takes from it and of the error of that.
+bool SubStepper::lets_slip() {
+  const double error = std::sqrt(std::max(solution.error, options.tolerance));
+  bool any = false;
+  for (std::size_t k = 0; k < turned.size(); ++k) {
+    PointContact& c = turned[k];
+    const double slips = near->meeting(c).friction;
+    if (!(c.mu > slips)) continue;
+    const auto velocity = [&](int body, const Vector3d& r) {
+      return Vector3d(solution.velocities[at(body)] +
+                      solution.angular_velocities[at(body)].cross(r));
+    };
+    const auto across = [&](const Vector3d& v) { return (v - c.normal.dot(v) * c.normal).norm(); };
+    const double taken = across(solution.impulses[k]) * (bodies.motion[at(c.first)].inverse_mass +
+                                                         bodies.motion[at(c.second)].inverse_mass);
+    if (!(across(velocity(c.first, c.r1) - velocity(c.second, c.r2) + c.slip) > error * taken))
+      continue;
+    c.mu = contacts.points[k].mu = slips;
+    any = true;
+  }
+  return any;
 }
 
 // Whether no contact closes with the present velocities, so that there is nothing to solve.

@@ -103,6 +103,8 @@ struct SubStepper {
   void add_stage(const char* effect, void (SubStepper::*method)());
   void make_stages();
   void solve_problem();
+  void hold_all();
+  bool lets_slip();
   void judge();
   bool shortest() const;
   bool nothing_presses() const;

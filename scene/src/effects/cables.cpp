@@ -2,11 +2,11 @@
 //
 // With L the sum of the distances from point to point, and s = L - rest - winch t:
 //
-//   tension T = max(0, k s + c ds/dt) where s > 0, else 0; the same all along the cable,
+//   tension T = max(0, k s + c ds/dt) where s > 0, else 0,
 //   potential k s^2 / 2 where s > 0,
 //   power -(T - k s) dL/dt - k s winch of what has no potential
-#include "mechanics/effect.hpp"
-#include "mechanics/pair_forces.hpp"
+#include "cable_item.hpp"
+#include "list.hpp"
 #include "tension.hpp"
 
 namespace tether::scene::effects {
@@ -15,85 +15,13 @@ using namespace mechanics;
 
 namespace {
 
-struct CablePoint {
-  int body;
-  Vector3d at;  // in its axes
-};
-
-/// A piece of a cable between two of its points.
-template <class S>
-struct Piece {
-  Vector3<S> from, to, along;
-  S length, rate;
-
-  Piece(const Frame<S>& A, const Vector3d& in_a, const Frame<S>& B, const Vector3d& in_b)
-      : length(0.0), rate(0.0) {
-    using std::sqrt;
-    const Jet<S> a = point<1>(A, in_a), b = point<1>(B, in_b);
-    from = a.x;
-    to = b.x;
-    along = b.x - a.x;
-    const S square = dot(along, along);
-    // Points that coincide have no direction, and the cable has none to pull in there.
-    if (!(square > 0.0)) {
-      along = Vector3<S>(S(0.0), S(0.0), S(0.0));
-      return;
-    }
-    length = sqrt(square);
-    for (int i = 0; i < 3; ++i) along[i] /= length;
-    const Vector3<S> relative = b.x1 - a.x1;
-    rate = dot(along, relative);
-  }
-  /// Adds the loads of the tension T on both bodies.
-  void pull(const Frame<S>& A, const Frame<S>& B, double T, Wrench<S>& on_a,
-            Wrench<S>& on_b) const {
-    Vector3<S> force = along;
-    for (int i = 0; i < 3; ++i) force[i] *= T;
-    on_a.add(A, from, force);
-    on_b.add(B, to, Vector3<S>(-force));
-  }
-};
-
-struct CableItem {
-  std::size_t index;  // of the scene's springs
-  std::vector<CablePoint> points;
-  double stiffness, damping, rest, winch;
-};
-
-/// The tension and its derivatives to length and rate.
-struct CableTension {
-  double elastic = 0, tension = 0, stretch = 0, by_length = 0, by_rate = 0, elastic_by_length = 0;
-
-  CableTension(const CableItem& of, double time, double length, double rate) {
-    stretch = length - of.rest - of.winch * time;
-    if (!(stretch > 0)) return;
-    elastic = of.stiffness * stretch;
-    elastic_by_length = of.stiffness;
-    tension = elastic + of.damping * (rate - of.winch);
-    if (tension > 0) {
-      by_length = of.stiffness;
-      by_rate = of.damping;
-    } else {
-      tension = 0;
-    }
-  }
-};
-
 class CableForces : public Force {
  public:
   CableForces(const Scene& scene, const Bodies& bodies) {
     for (std::size_t i = 0; i < scene.springs.size(); ++i) {
       const Spring& each = scene.springs[i];
       if (!each.cable) continue;
-      CableItem item{i, {}, each.stiffness, each.damping, 0, each.cable->winch};
-      const auto add_point = [&](int body, const Vector3d& where) {
-        const int index = bodies.index(body);
-        item.points.push_back({index, point_in(bodies.frames[at(index)], where)});
-      };
-      add_point(each.first, each.at);
-      for (const Ring& ring : each.cable->rings) add_point(ring.body, ring.at);
-      add_point(each.second, each.at_second);
-      item.rest = each.rest ? *each.rest : measured(bodies, item).first;
+      CableItem item(each, i, bodies);
       works_ = works_ || item.damping > 0 || item.winch != 0;
       items_.push_back(std::move(item));
     }
@@ -102,7 +30,7 @@ class CableForces : public Force {
 
   void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
     for (const CableItem& each : items_) {
-      const double T = tension(bodies, each).tension;
+      const double T = CableTension(each, bodies).tension;
       each_wrench(bodies, each, T, [&](int body, const Wrench<double>& wrench) {
         put_wrench(bodies, body, wrench, loads);
       });
@@ -112,7 +40,7 @@ class CableForces : public Force {
   void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const CableItem& each : items_) {
       const Slopes slopes = slopes_of(bodies, each);
-      const CableTension now = tension(bodies, each);
+      const CableTension now(each, bodies);
       for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
         const auto [A, B] = seed_piece(bodies, each, k);
         const Piece<Dual> piece(A, each.points[k].at, B, each.points[k + 1].at);
@@ -137,7 +65,7 @@ class CableForces : public Force {
   double potential(const Bodies& bodies) const override {
     double sum = 0;
     for (const CableItem& each : items_) {
-      const CableTension now(each, bodies.time + bodies.span, measured(bodies, each).first, 0);
+      const CableTension now(each, bodies.time + bodies.span, each.measured(bodies).first, 0);
       sum += 0.5 * now.elastic * std::max(0.0, now.stretch);
     }
     return sum;
@@ -145,15 +73,15 @@ class CableForces : public Force {
   void add_potential_gradient(const Bodies& bodies, double* row) const override {
     for (const CableItem& each : items_)
       each_wrench(
-          bodies, each, tension(bodies, each).elastic,
+          bodies, each, CableTension(each, bodies).elastic,
           [&](int body, const Wrench<double>& wrench) { put_gradient(bodies, body, wrench, row); });
   }
   bool has_power() const override { return works_; }
   double power(const Bodies& bodies) const override {
     double sum = 0;
     for (const CableItem& each : items_) {
-      const double rate = measured(bodies, each).second;
-      const CableTension now = tension(bodies, each);
+      const double rate = each.measured(bodies).second;
+      const CableTension now(each, bodies);
       sum -= (now.tension - now.elastic) * rate + now.elastic * each.winch;
     }
     return sum;
@@ -161,8 +89,8 @@ class CableForces : public Force {
   void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const CableItem& each : items_) {
       const Slopes slopes = slopes_of(bodies, each);
-      const double rate = measured(bodies, each).second;
-      const CableTension now = tension(bodies, each);
+      const double rate = each.measured(bodies).second;
+      const CableTension now(each, bodies);
       const double by_length =
           (now.by_length - now.elastic_by_length) * rate + now.elastic_by_length * each.winch;
       const double by_rate = now.by_rate * rate + now.tension - now.elastic;
@@ -174,10 +102,11 @@ class CableForces : public Force {
   void report(const Bodies& bodies, Forces& forces) const override {
     for (const CableItem& each : items_) {
       const CablePoint &a = each.points.front(), &b = each.points.back();
-      report_tension(each.index,
-                     {tension(bodies, each).tension, point<0>(bodies.frames[at(a.body)], a.at).x,
-                      point<0>(bodies.frames[at(b.body)], b.at).x},
-                     forces);
+      report_tension(
+          each.index,
+          {CableTension(each, bodies).tension, point<0>(bodies.frames[at(a.body)], a.at).x,
+           point<0>(bodies.frames[at(b.body)], b.at).x},
+          forces);
     }
   }
   // |dL/dx| is at most 1 at an end and 2 at a ring, and adds up over the points of a body.
@@ -197,7 +126,7 @@ class CableForces : public Force {
   void step(SteppedBodies& stepped, double dt) const override {
     const Bodies& bodies = stepped.before_forces();
     for (const CableItem& each : items_) {
-      const auto [length, rate] = measured(bodies, each);
+      const auto [length, rate] = each.measured(bodies);
       const CableTension now(each, stepped.bodies().time, length, rate);
       each_wrench(bodies, each, 1, [&](int body, const Wrench<double>& unit) {
         stepped.push(body, dt, now.elastic * unit.force, now.elastic * unit.torque);
@@ -213,45 +142,16 @@ class CableForces : public Force {
     std::vector<Derivatives> length, rate;
   };
 
-  static const Frame<double>& frame_of(const Bodies& bodies, const CableItem& each, std::size_t p) {
-    return bodies.frames[at(each.points[p].body)];
-  }
-  static Piece<double> piece_of(const Bodies& bodies, const CableItem& each, std::size_t k) {
-    return {frame_of(bodies, each, k), each.points[k].at, frame_of(bodies, each, k + 1),
-            each.points[k + 1].at};
-  }
   static std::pair<Frame<Dual>, Frame<Dual>> seed_piece(const Bodies& bodies, const CableItem& each,
                                                         std::size_t k) {
-    return {seed(frame_of(bodies, each, k), bodies.moves(each.points[k].body), 0),
-            seed(frame_of(bodies, each, k + 1), bodies.moves(each.points[k + 1].body),
-                 kBodyDirections)};
+    return {
+        seed(each.frame(bodies, k), bodies.moves(each.points[k].body), 0),
+        seed(each.frame(bodies, k + 1), bodies.moves(each.points[k + 1].body), kBodyDirections)};
   }
-  /// Length and rate.
-  static std::pair<double, double> measured(const Bodies& bodies, const CableItem& each) {
-    std::pair<double, double> sum(0.0, 0.0);
-    for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
-      const Piece<double> piece = piece_of(bodies, each, k);
-      sum.first += piece.length;
-      sum.second += piece.rate;
-    }
-    return sum;
-  }
-  static CableTension tension(const Bodies& bodies, const CableItem& each) {
-    const auto [length, rate] = measured(bodies, each);
-    return {each, bodies.time, length, rate};
-  }
-  /// The wrench on the body of each point in turn, both pieces together.
   template <class Do>
   static void each_wrench(const Bodies& bodies, const CableItem& each, double T, const Do& act) {
-    Wrench<double> left = no_wrench<double>();
-    for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
-      Wrench<double> right = no_wrench<double>();
-      piece_of(bodies, each, k)
-          .pull(frame_of(bodies, each, k), frame_of(bodies, each, k + 1), T, left, right);
-      act(each.points[k].body, left);
-      left = right;
-    }
-    act(each.points.back().body, left);
+    each.each_wrench(
+        bodies, [T](std::size_t) { return T; }, act);
   }
   static Slopes slopes_of(const Bodies& bodies, const CableItem& each) {
     Slopes out;
@@ -303,6 +203,7 @@ class CableEffect : public Effect {
       form.number("damping", spring.damping, files::kNotNegative, kDamping);
       form.number("length", spring.rest, files::kPositive, kMetres);
       form.number("winch", spring.cable->winch, files::kAny, kSpeed);
+      for (const Effect* each : all()) each->cable_fields(form, *spring.cable);
       return whole;
     };
     root.each("cable", scene.springs, one,

@@ -28,6 +28,7 @@ inline void check_tension_step(const Scene& scene, const Spring& spring, double 
 inline void report_tension(std::size_t index, const SpringForce& force, Forces& forces) {
   forces.springs.resize(std::max(forces.springs.size(), index + 1));
   forces.springs[index] = force;
+  forces.springs[index].tension_second = force.tension;
 }
 
 }  // namespace tether::scene::effects

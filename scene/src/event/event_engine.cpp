@@ -304,7 +304,11 @@ void EventEngine::append_events() {
     e.time = units_.time * from.time;
     e.kind = from.kind;
     double arm = 1;  // of what turns, m
-    if (model_->is_law(from.contact)) {
+    if (const auto* slip = model_->slip_law(from.contact)) {
+      const Spring& cable = scene_.springs[at(slip->cable())];
+      e.first = cable.first;
+      e.second = cable.second;
+    } else if (model_->is_law(from.contact)) {
       const int number = model_->joint_laws().joint(model_->joint_law(from.contact));
       const Joint& joint = scene_.joints[at(number)];
       e.joint = number;

@@ -335,7 +335,7 @@ ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationSol
                    a.norm() > 0 ? VectorXd(a.normalized()) : VectorXd::Unit(a.size(), 0)};
   const bool same = i == left.contact && left.by == Watch::slip &&
                     mode.direction.dot(motion_.modes()[at(i)].direction) > 0.5;
-  if (!(model_.law(i).friction > 0) || !(sticks || same)) return mode;
+  if (!(model_.holding(i) > 0) || !(sticks || same)) return mode;
   return {Mode::stick, sticks ? VectorXd() : mode.direction};
 }
 

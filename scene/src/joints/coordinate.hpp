@@ -6,6 +6,7 @@
 #include <tether/scene/engine.hpp>
 
 #include "coordinate.hpp"
+#include "effects/capstan.hpp"
 #include "mechanics/force.hpp"
 
 namespace tether::scene::joints {
@@ -211,26 +212,50 @@ S Coordinate::angle_over_sine(const S& cosine) {
 std::vector<Coordinate> coordinates_of(const Joint& joint, std::size_t number,
                                        const Bodies& bodies);
 
-/// Limits, motors, friction and springs of all joints of a scene: as the contact library's steps
-/// take them, and one by one.
+/// Limits, motors, friction and springs of all joints of a scene, and what rubs of its cables: as
+/// the contact library's steps take them, and one by one.
 class JointLaws {
  public:
   /// `bodies`: at t = 0. Throws std::invalid_argument on laws of joints that have no free
   /// coordinate, and on a start beyond a limit.
   JointLaws(const Scene& scene, const Bodies& bodies);
 
-  bool any() const { return !joints_.empty(); }
+  bool any() const { return !joints_.empty() || !slips_.empty(); }
+  const std::vector<effects::CapstanSlip>& slips() const { return slips_; }
   /// In the order of add(), after which these can be asked for.
   int count() const { return static_cast<int>(placed_.size()); }
+  /// The slip of a cable; null: it is of a joint.
+  const effects::CapstanSlip* slip(int law) const {
+    const int k = placed_[at(law)].item - static_cast<int>(joints_.size());
+    return k < 0 ? nullptr : &slips_[at(k)];
+  }
+  // For laws of joints.
   double sign(int law) const { return placed_[at(law)].sign; }  ///< -1: sees it backwards
   int joint(int law) const { return item(law).joint; }          ///< of the scene
   const Coordinate& coordinate(int law) const { return item(law).coordinate; }
   double value(int law, const Bodies& bodies) const { return value(item(law), bodies); }
+  /// Loads that a unit of force along a law makes: f(body, wrench) for those that move.
+  template <class F>
+  void each_load(int law, const Bodies& bodies, const F& f) const {
+    if (const effects::CapstanSlip* of = slip(law)) return of->each_load(bodies, f);
+    const Coordinate& along = coordinate(law);
+    Wrench<double> on[2];
+    along.gradient(bodies, on[0], on[1]);
+    const int body[2] = {along.first(), along.second()};
+    for (int side = 0; side < 2; ++side) {
+      on[side].force *= sign(law);
+      on[side].torque *= sign(law);
+      if (bodies.moves(body[side])) f(body[side], on[side]);
+    }
+  }
   void add(const Bodies& bodies, contact::JointLaws& out);
   /// Adds what the impulses (of the last add()) over dt do to their joints; springs are Forces and
   /// tell theirs.
   void add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
                   std::vector<JointForce>& forces) const;
+  /// The same of cables, to the means of their tensions.
+  void part_tensions(const std::vector<double>& impulses, double dt,
+                     std::vector<SpringForce>& forces) const;
 
  private:
   struct Item {
@@ -243,11 +268,14 @@ class JointLaws {
     double sign;
     bool sprung;
   };
+  void place(int item, double sign, const Bodies& bodies, contact::JointLaws& out);
   double value(const Item& item, const Bodies& bodies) const;
+  double turn(int ball, const Bodies& bodies) const;
   const Item& item(int law) const { return joints_[at(placed_[at(law)].item)]; }
 
-  std::vector<Item> joints_;    // a ball is three
-  std::vector<Placed> placed_;  // by law
+  std::vector<Item> joints_;                 // a ball is three
+  std::vector<effects::CapstanSlip> slips_;  // behind them
+  std::vector<Placed> placed_;               // by law
 };
 
 }  // namespace tether::scene::joints

@@ -81,6 +81,9 @@ JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
     if (joint.limits && (joint.limits->lower > kBeyond || joint.limits->upper < -kBeyond))
       throw std::invalid_argument(name + "it is at 0 at t = 0, which must be between its limits");
   }
+  for (std::size_t i = 0; i < scene.springs.size(); ++i)
+    if (scene.springs[i].cable && scene.springs[i].cable->capstan)
+      slips_.emplace_back(scene.springs[i], i, bodies);
 }
 
 // The turn of a hinge whose angle is nearest to the middle between its limits.
@@ -92,35 +95,48 @@ double JointLaws::value(const Item& item, const Bodies& bodies) const {
   return value + turn * std::round((middle - value) / turn);
 }
 
+double JointLaws::turn(int joint, const Bodies& bodies) const {
+  double square = 0;
+  for (const Item& each : joints_) {
+    if (each.joint != joint) continue;
+    const double component = each.coordinate.value(bodies);
+    square += component * component;
+  }
+  return std::sqrt(square);
+}
+
 void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
   placed_.clear();
   mechanics::JointLawList list{out, bodies.time, nullptr};
   for (std::size_t k = 0; k < joints_.size(); ++k) {
     const Item& item = joints_[k];
     const double at_now = value(item, bodies);
-    Wrench<double> on[2];
-    item.coordinate.gradient(bodies, on[0], on[1]);
-    const int body[2] = {item.coordinate.first(), item.coordinate.second()};
-    // One law after the other: a term goes to the law added last.
-    list.on = [&](double sign) {
-      placed_.push_back({static_cast<int>(k), sign, out[out.count() - 1].is_sprung()});
-      for (int side = 0; side < 2; ++side) {
-        if (!bodies.moves(body[side])) continue;
-        contact::Vector6d G;
-        G << sign * on[side].force, sign * on[side].torque;
-        out.on(body[side], G);
-      }
-    };
+    list.on = [&](double sign) { place(static_cast<int>(k), sign, bodies, out); };
+    if (item.law.spring && item.coordinate.is_component()) list.turn = turn(item.joint, bodies);
     for (const effects::Effect* each : effects::all())
       each->add_laws(item.law, item.joint, at_now, list);
   }
+  for (std::size_t k = 0; k < slips_.size(); ++k) {
+    out.add_bounded(-1, slips_[k].wanted(), slips_[k].bound(bodies));
+    place(static_cast<int>(joints_.size() + k), 1, bodies, out);
+  }
+}
+
+// One law after the other: a term goes to the law added last.
+void JointLaws::place(int item, double sign, const Bodies& bodies, contact::JointLaws& out) {
+  placed_.push_back({item, sign, out[out.count() - 1].is_sprung()});
+  each_load(count() - 1, bodies, [&](int body, const Wrench<double>& on) {
+    contact::Vector6d G;
+    G << on.force, on.torque;
+    out.on(body, G);
+  });
 }
 
 void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
                            std::vector<JointForce>& forces) const {
   if (!(dt > 0)) return;
   for (std::size_t i = 0; i < impulses.size() && i < placed_.size(); ++i) {
-    if (placed_[i].sprung) continue;
+    if (placed_[i].sprung || slip(static_cast<int>(i))) continue;
     const Item& item = joints_[at(placed_[i].item)];
     const double x = placed_[i].sign * impulses[i] / dt;
     JointForce& force = forces[at(item.joint)];
@@ -128,6 +144,15 @@ void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impu
     (angle ? force.moment : force.force) += x * item.coordinate.direction(bodies);
     force.drive += x;
   }
+}
+
+void JointLaws::part_tensions(const std::vector<double>& impulses, double dt,
+                              std::vector<SpringForce>& forces) const {
+  for (std::size_t i = 0; dt > 0 && i < impulses.size() && i < placed_.size(); ++i)
+    if (const effects::CapstanSlip* of = slip(static_cast<int>(i))) {
+      forces[at(of->cable())].tension += impulses[i] / dt;
+      forces[at(of->cable())].tension_second -= impulses[i] / dt;
+    }
 }
 
 }  // namespace tether::scene::joints

@@ -18,6 +18,7 @@ struct JointLawList {
   contact::JointLaws& laws;
   double time;                          ///< s
   std::function<void(double sign)> on;  ///< puts the law added last on the bodies of the joint
+  double turn = 0;                      ///< of a ball with a table since t = 0, rad
 
   void limit(int joint, double gap, double restitution, double sign) {
     laws.add_limit(joint, gap, restitution);
@@ -78,6 +79,7 @@ class Effect {
   enum class ActsOn { coordinates, turns, all_joints };
   virtual ActsOn acts_on() const { return ActsOn::coordinates; }
   virtual void pair_fields(const files::Form&, Pair&) const {}
+  virtual void cable_fields(const files::Form&, Cable&) const {}
   /// Checks across the fields of a scene.
   virtual void check(const Scene&, files::Report&) const {}
   virtual void check_body(const Body&, files::Report&) const {}

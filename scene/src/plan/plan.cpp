@@ -116,9 +116,10 @@ class Refusals {
                  "[event]");
     refuse(a.contact && a.smooth,
            "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
-    refuse(a.laws && a.smooth,
-           "the joints of the scene have limits, motors or friction, which the smooth engine does "
-           "not have: use [stepping] or [event]");
+    refuse(
+        a.laws && a.smooth,
+        "the joints of the scene have limits, motors or friction, or cables rub, which the smooth "
+        "engine does not have: use [stepping] or [event]");
     refuse(a.takes_steps() && a.projected,
            "the stepping engine projects no invariants: give them project = false, or, without "
            "contacts, use [smooth]");
@@ -154,14 +155,15 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   }
   if (asked.event) {
     why = asked.contact ? "bodies touch, and the scene asks for it"
-          : asked.laws  ? "joints have limits, motors or friction, and the scene asks for it"
-                        : "the scene asks for it";
+          : asked.laws
+              ? "joints have limits, motors or friction, or cables rub, and the scene asks for it"
+              : "the scene asks for it";
     return EngineKind::event;
   }
   if (asked.contact)
     why = s.joints.empty() ? "bodies touch" : "bodies touch; it has joints, too";
   else if (asked.laws && !asked.stepping)
-    why = "joints have limits, motors or friction";
+    why = "joints have limits, motors or friction, or cables rub";
   else
     why = asked.stepping ? "the scene asks for it"
           : asked.smooth ? "nothing touches, and the scene asks for it"

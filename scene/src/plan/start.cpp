@@ -30,6 +30,7 @@ Scene only_contacts(const Scene& scene) {
   for (Pair& pair : out.pairs) {
     pair.friction = pair.rolling = pair.torsional = 0;
     pair.friction_across.reset();
+    pair.static_friction.reset();
   }
   SteppingOptions& steps = out.stepping.emplace();
   steps.error_reduction = 0;  // nothing moves

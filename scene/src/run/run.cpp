@@ -385,8 +385,26 @@ bool RunResult::met() const {
   return all_of(judgements, [](const Judgement& j) { return j.beyond || (j.judged && j.met); });
 }
 
+namespace {
+
+/// Laws that certificates do not tell.
+void refuse_uncertified(const Scene& scene) {
+  for (const Spring& each : scene.springs)
+    if (each.cable && each.cable->capstan)
+      throw std::invalid_argument("certificates do not know capstan friction, which cable \"" +
+                                  each.name + "\" has: run it without --certificate");
+  for (const Pair& each : scene.pairs)
+    if (each.static_friction)
+      throw std::invalid_argument("certificates do not know static_friction, which the pair of \"" +
+                                  each.first + "\" and \"" + each.second +
+                                  "\" has: run it without --certificate");
+}
+
+}  // namespace
+
 RunResult run(const Scene& scene, const RunOptions& options) {
   if (scene.output["certificate"].empty()) return Run(scene, options).go();
+  refuse_uncertified(scene);
   certificate::Sheet sheet(scene);
   Scene observed = scene;
   observed.certificate = &sheet;

@@ -289,7 +289,8 @@ std::unique_ptr<Engine> make_smooth_engine(const Scene& scene) {
         "[event]");
   if (effects::has_joint_laws(scene))
     throw std::invalid_argument(
-        "the smooth engine has no limits, motors and friction of joints: use [stepping] or "
+        "the smooth engine has no limits, motors and friction of joints and cables: use [stepping] "
+        "or "
         "[event]");
   const SmoothOptions options = scene.smooth.value_or(SmoothOptions{});
   if (!(options.tolerance > 0 && options.tolerance < 1))

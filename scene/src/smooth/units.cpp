@@ -120,6 +120,7 @@ void to_si(const Units& u, const Scene& scene, scene::Forces& forces) {
   }
   for (SpringForce& each : forces.springs) {
     each.tension *= u.force();
+    each.tension_second *= u.force();
     each.at *= u.length;
     each.at_second *= u.length;
   }

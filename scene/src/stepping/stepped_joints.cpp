@@ -14,7 +14,10 @@ SteppedJoints::SteppedJoints(const Scene& scene)
 
 void SteppedJoints::add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) {
   bodies_.set_time(t, 0);
-  bodies_.read_positions(bodies);
+  if (laws_.slips().empty())
+    bodies_.read_positions(bodies);
+  else
+    bodies_.copy_motions(bodies);
   laws_.add(bodies_.bodies(), out);
 }
 
@@ -49,6 +52,7 @@ void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) 
   bodies_.read_positions(bodies);
   rows_.set_time(t);
   rows_.values<0>(bodies_.bodies(), g);
+  std::fill_n(g + rows_.count(), laws_.slips().size(), 0.0);
 }
 
 // A multiplier pulls with the gradient of its row. JointRows::each goes kind by kind, and rows are
@@ -77,6 +81,10 @@ void SteppedJoints::add_rows(const contact::BodySet& bodies, double t, contact::
   for (const Gradient& each : gradients_) {
     out.add(each.joint, each.rate);
     for (std::size_t k = 0; k < each.count; ++k) out.on(each.on[k].first, each.on[k].second);
+  }
+  for (const effects::CapstanSlip& each : laws_.slips()) {
+    out.add(static_cast<int>(rows_.joint_count()));
+    each.each_load(all, [&](int body, const auto&) { out.on(body, contact::Vector6d::Zero()); });
   }
 }
 

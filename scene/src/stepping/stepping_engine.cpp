@@ -185,7 +185,7 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
       stepper_(make_stepper(std::move(mapped))),
       fingerprint_(fingerprint(scene, stepper_.options().step)),
       bodies_(scene.bodies.size()) {
-  if (!scene.joints.empty()) {
+  if (!scene.joints.empty() || effects::has_joint_laws(scene)) {
     auto joints = std::make_unique<SteppedJoints>(scene);
     joints_ = joints.get();
     stepper_.add_joints(std::move(joints));
@@ -266,7 +266,7 @@ void SteppingEngine::report_failure() const {
       "in sub-steps of {:g} s; raise stepping.tolerance or stepping.max_halvings, reduce "
       "stepping.step, or set on_failure = \"warn\"",
       time(),
-      contacts == 0 ? std::string("the limits, motors and friction of joints")
+      contacts == 0 ? std::string("the limits, motors and friction of joints and cables")
                     : fmt::format("{} contact{}", contacts, contacts == 1 ? "" : "s"),
       contact::name(stepper_.status()), stepper_.residual(), stepper_.options().tolerance,
       std::ldexp(stepper_.options().step, -stepper_.options().max_halvings));
@@ -340,8 +340,10 @@ Forces SteppingEngine::forces() const {
   if (joints_)
     out.joints = joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(),
                                  stepper_.law_impulses(), stepper_.last_sub_step());
+  stepped_.set_time(time(), 0);
   stepped_.copy_motions(stepper_.bodies());
   for (const auto& force : forces_) force->report(stepped_.bodies(), out);
+  if (joints_) joints_->part_tensions(stepper_.law_impulses(), stepper_.last_sub_step(), out);
   return out;
 }
 

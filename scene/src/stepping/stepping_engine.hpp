@@ -14,7 +14,8 @@ class SteppedJoints final : public contact::JointEquations {
  public:
   explicit SteppedJoints(const Scene& scene);
 
-  int rows() const override { return rows_.count(); }
+  /// The last ones are of zeros: they join the bodies of a cable that rubs, which has laws only.
+  int rows() const override { return rows_.count() + static_cast<int>(laws_.slips().size()); }
   void values(const contact::BodySet& bodies, double t, double* g) override;
   void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
   /// Impulses by row, over dt, as forces at these positions.
@@ -30,9 +31,16 @@ class SteppedJoints final : public contact::JointEquations {
   /// coupling.
   std::vector<std::array<mechanics::Wrench<double>, 2>> pulls(
       const std::vector<double>& impulses) const;
+  /// Parts the mean tensions of cables that rub.
+  void part_tensions(const std::vector<double>& law_impulses, double dt, Forces& out) const {
+    laws_.part_tensions(law_impulses, dt, out.springs);
+  }
   bool has_laws() const override { return laws_.any(); }
   void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;
-  std::string name(int joint) const override { return "joint \"" + rows_.name(joint) + "\""; }
+  std::string name(int joint) const override {
+    return mechanics::at(joint) < rows_.joint_count() ? "joint \"" + rows_.name(joint) + "\""
+                                                      : "a cable";
+  }
 
  private:
   /// One row; the first `count` of its bodies are in use.

@@ -45,8 +45,7 @@ class JointLaws {
   /// stiffness, damping >= 0, not both 0; bound >= 0, may be infinite.
   void add_sprung(int joint, double stretch, double stiffness, double damping, double rate,
                   double bound);
-  /// Adds the term G v of one more body to the law added last, which has at most two; body -1, the
-  /// world, is ignored.
+  /// Adds the term G v of one more body to the law added last; body -1, the world, is ignored.
   void on(int body, const Vector6d& G);
 
   int count() const { return rows_.count(); }  ///< number of laws

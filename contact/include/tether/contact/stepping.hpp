@@ -112,6 +112,10 @@ struct Meeting {
   /// Coefficient across the friction_axis of the surface of material `first`, along which
   /// `friction` holds (method, section 8). Absent: `friction` in all directions.
   std::optional<double> friction_across = {};
+  /// Coefficient of contacts that hold, at least `friction`, which is then that of those that slip
+  /// and of impacts. A contact holds at the end of a step if this coefficient can hold it there.
+  /// Not with friction_across. Absent: `friction`.
+  std::optional<double> static_friction = {};
   /// Whether the coefficients differ.
   bool is_elliptic() const { return friction_across && *friction_across != friction; }
   /// The larger coefficient.

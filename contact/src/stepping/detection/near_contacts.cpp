@@ -44,6 +44,10 @@ void check(const Meeting& m) {
     throw std::invalid_argument("meeting: rolling and torsional must be >= 0 and finite");
   if (!(m.friction_across.value_or(0) >= 0) || !std::isfinite(m.friction_across.value_or(0)))
     throw std::invalid_argument("meeting: friction_across must be >= 0 and finite");
+  if (m.static_friction &&
+      !(*m.static_friction >= m.friction && std::isfinite(*m.static_friction) && !m.is_elliptic()))
+    throw std::invalid_argument(
+        "meeting: static_friction must be finite and at least friction, without friction_across");
   if (m.is_elliptic() && m.first == m.second)
     throw std::invalid_argument(
         "meeting: friction_across is of two materials: the first one has the axis");
@@ -131,6 +135,12 @@ std::array<Vector3d, 2> NearContacts::scaled_tangents(const PointContact& c) con
   along.normalize();
   return {m.friction / m.largest_friction() * along,
           *m.friction_across / m.largest_friction() * c.normal.cross(along)};
+}
+
+bool NearContacts::any_static() const {
+  return law_ != Law::frictionless &&
+         std::any_of(meetings_.begin(), meetings_.end(),
+                     [](const auto& each) { return each.second.static_friction.has_value(); });
 }
 
 bool NearContacts::any_elliptic() const {

@@ -49,6 +49,7 @@ class NearContacts {
   bool any_restitution() const;
   bool any_rolling() const;
   bool any_elliptic() const;
+  bool any_static() const;
   /// Two tangents at right angles of a contact with elliptic friction, after find(): each as long
   /// as its coefficient over the larger one, which is PointContact::mu.
   std::array<Eigen::Vector3d, 2> scaled_tangents(const PointContact& c) const;

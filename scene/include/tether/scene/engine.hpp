@@ -45,8 +45,9 @@ struct JointForce {
 
 /// Force of a spring and its damper.
 struct SpringForce {
-  double tension = 0;  ///< > 0: pulls its ends together, N
+  double tension = 0;  ///< at its first end; > 0: pulls its ends together, N
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), at_second = Eigen::Vector3d::Zero();  ///< ends, m
+  double tension_second = 0;  ///< at its second end, another one where a cable rubs at a ring, N
 };
 
 /// Forces at Engine::time(). In stepping they are means over the last step, or over its last

@@ -88,21 +88,37 @@ struct Pair {
   /// Coefficient across the friction_axis of the body of material `first`, along which `friction`
   /// holds; absent: `friction` in all directions.
   std::optional<double> friction_across = {};
+  /// Coefficient of contacts that hold, at least `friction`, which is that of those that slip and
+  /// of impacts then; absent: `friction`.
+  std::optional<double> static_friction = {};
 
   /// Whether the coefficients differ.
   bool is_elliptic() const { return friction_across && *friction_across != friction; }
 };
 
-/// A frictionless ring or small pulley on a cable.
+/// A ring or small pulley on a cable, without friction unless a Capstan names it.
 struct Ring {
   int body = -1;                                 ///< index, -1 the world
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< world coordinates at t = 0, m
 };
 
+/// Friction of a cable at one of its rings: the tensions before and behind it differ by a factor of
+/// at most e^(friction wrap).
+struct Capstan {
+  int ring = 1;                ///< which of Cable::rings, from 1 on
+  double friction = 0;         ///< coefficient
+  std::optional<double> wrap;  ///< rad; absent: the angle between the pieces at the ring
+  /// For a pulley that turns with the body of the ring, m: the slip is against its rim. 0: a ring.
+  double radius = 0;
+  /// Unit, world axes at t = 0: turns about it carry the cable towards its second end.
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+};
+
 /// A spring that does not push, through rings.
 struct Cable {
   std::vector<Ring> rings;  ///< from the first end to the second
-  double winch = 0;         ///< the rest grows by it, m/s
+  double winch = 0;         ///< the rest grows by it, m/s; where it rubs, before the ring
+  std::optional<Capstan> capstan = {};  ///< absent: it rubs nowhere
 };
 
 /// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points. A cable has the sum

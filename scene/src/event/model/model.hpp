@@ -56,6 +56,8 @@ class Model {
   virtual int contacts() const = 0;
   virtual int tangents() const = 0;  ///< of a contact: 1 in the plane, 2 in space
   virtual ContactLaw law(int contact) const = 0;
+  /// The coefficient of friction without slip: that of the law, or a larger one.
+  virtual double holding(int contact) const { return law(contact).friction; }
   /// Sizes of coordinates, velocities and energy: tolerances are relative to them where values are
   /// smaller. 1 in units in which these are near 1.
   virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }

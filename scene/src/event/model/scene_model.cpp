@@ -14,7 +14,8 @@ LawContacts::LawContacts(const Scene& scene, const mechanics::Bodies& bodies)
   laws_.add(bodies, all);
   for (int law = 0; law < all.count(); ++law) {
     const contact::JointLaws::Law& from = all[law];
-    if (from.is_sprung() || (!from.limit && from.bound == 0)) continue;
+    const bool rubs = laws_.slip(law) != nullptr;
+    if (from.is_sprung() || (!from.limit && !rubs && from.bound == 0)) continue;
     Entry each{law, {}, 0, 0};
     if (from.limit) {
       each.of.restitution = from.restitution;
@@ -40,20 +41,17 @@ double LawContacts::gap(int k, const mechanics::Bodies& bodies, double& rate) co
 void LawContacts::evaluate_contact(int k, const mechanics::Bodies& bodies,
                                    ContactKinematics& out) const {
   const Entry& each = at_place(k);
-  const joints::Coordinate& s = laws_.coordinate(each.law);
-  const double sign = laws_.sign(each.law);
   const int velocities = 6 * bodies.moving;
   Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(velocities);
-  mechanics::Wrench<double> on[2];
-  s.gradient(bodies, on[0], on[1]);
-  const int body[2] = {s.first(), s.second()};
-  for (int side = 0; side < 2; ++side) {
-    const int slot = bodies.inertia[mechanics::at(body[side])].slot;
-    if (slot < 0) continue;
-    const Eigen::Matrix3d& R = bodies.frames[mechanics::at(body[side])].R;
-    row.segment<3>(6 * slot) += sign * on[side].force.transpose();
-    row.segment<3>(6 * slot + 3) += sign * (R.transpose() * on[side].torque).transpose();
-  }
+  laws_.each_load(each.law, bodies, [&](int body, const mechanics::Wrench<double>& on) {
+    const int slot = bodies.inertia[mechanics::at(body)].slot;
+    const Eigen::Matrix3d& R = bodies.frames[mechanics::at(body)].R;
+    row.segment<3>(6 * slot) += on.force.transpose();
+    row.segment<3>(6 * slot + 3) += on.torque.transpose() * R;
+  });
+  const effects::CapstanSlip* slip = laws_.slip(each.law);
+  const double rest =
+      slip ? slip->rest(bodies) : laws_.sign(each.law) * laws_.coordinate(each.law).rest(bodies);
   out.gap = gap(k, bodies, out.normal_rate);
   out.normal.setZero(velocities);
   out.tangents.setZero(2, velocities);
@@ -63,15 +61,16 @@ void LawContacts::evaluate_contact(int k, const mechanics::Bodies& bodies,
   if (each.of.is_bounded()) {
     out.tangents.row(0) = row;
     out.slip_rate[0] = -each.wanted;
-    out.slip_rest[0] = sign * s.rest(bodies);
+    out.slip_rest[0] = rest;
   } else {
     out.normal = row;
-    out.normal_rest = sign * s.rest(bodies);
+    out.normal_rest = rest;
   }
 }
 
 Eigen::Vector3d LawContacts::direction(int k, const mechanics::Bodies& bodies) const {
   const int law = at_place(k).law;
+  if (laws_.slip(law)) return Eigen::Vector3d::Zero();
   return laws_.sign(law) * laws_.coordinate(law).direction(bodies);
 }
 
@@ -116,6 +115,7 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
       loads_(at(bodies_.count())) {
   for (const Body& each : scene.bodies) body_names_.push_back(each.name);
   for (const Joint& each : scene.joints) joint_names_.push_back(each.name);
+  for (const Spring& each : scene.springs) spring_names_.push_back(each.name);
   bodies_.set_state(y_.data());
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     if (!scene.bodies[b].surface) continue;
@@ -124,6 +124,7 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
   }
   axes_.assign(pairs_.size(), Vector3d::Zero());
   add_moments();
+  find_holding(scene);
   settle();
 }
 
@@ -146,8 +147,23 @@ void SceneModel::add_moments() {
   }
 }
 
+void SceneModel::find_holding(const Scene& scene) {
+  for (const Pair& from : scene.pairs)
+    for (std::size_t k = 0; from.static_friction && k < pairs_.size(); ++k) {
+      const std::string &a = scene.bodies[at(pairs_[k].first)].material,
+                        &b = scene.bodies[at(pairs_[k].second)].material;
+      holding_.resize(pairs_.size(), -1);
+      if (std::minmax(a, b) == std::minmax(from.first, from.second))
+        holding_[k] = *from.static_friction;
+    }
+  for (std::size_t k = 0; k < holding_.size(); ++k)
+    holding_[k] = std::max(holding_[k], pairs_[k].friction);
+}
+
 std::string SceneModel::contact_name(int contact) const {
   if (is_moment(contact)) contact = moment(contact).pair;
+  if (const auto* slip = slip_law(contact))
+    return "the cable \"" + spring_names_[at(slip->cable())] + "\"";
   if (is_law(contact))
     return "the limit of joint \"" + joint_names_[at(laws_.all().joint(joint_law(contact)))] + "\"";
   const FeaturePair& p = pair(contact);
@@ -391,6 +407,11 @@ Forces SceneModel::forces_of(const joints::Reactions& reactions,
 }
 
 void SceneModel::add_law_force(int contact, const VectorXd& parts, Forces& out) const {
+  if (const auto* slip = slip_law(contact)) {
+    out.springs[at(slip->cable())].tension += parts[1];
+    out.springs[at(slip->cable())].tension_second -= parts[1];
+    return;
+  }
   const int law = joint_law(contact);
   const bool bounded = this->law(contact).is_bounded();
   JointForce& force = out.joints[at(joint_laws().joint(law))];

@@ -25,9 +25,15 @@ class LawContacts {
   int count() const { return static_cast<int>(list_.size()); }
   const joints::JointLaws& all() const { return laws_; }
   int place(int k) const { return at_place(k).law; }  ///< in all()
-  ContactLaw law(int k) const { return at_place(k).of; }
+  /// Cables rub by their tension.
+  ContactLaw law(int k, const mechanics::Bodies& bodies) const {
+    ContactLaw of = at_place(k).of;
+    if (const auto* slip = laws_.slip(place(k))) of.bound = slip->bound(bodies);
+    return of;
+  }
   double gap(int k, const mechanics::Bodies& bodies, double& rate) const;
   void evaluate_contact(int k, const mechanics::Bodies& bodies, ContactKinematics& out) const;
+  /// Zero of a cable.
   Eigen::Vector3d direction(int k, const mechanics::Bodies& bodies) const;
 
  private:
@@ -63,11 +69,15 @@ class SceneModel final : public Model {
   int pairs() const { return static_cast<int>(pairs_.size()); }
   int tangents() const override { return 2; }
   ContactLaw law(int contact) const override {
-    if (is_law(contact)) return laws_.law(contact - pairs());
+    if (is_law(contact)) return laws_.law(contact - pairs(), bodies_.all());
     if (is_moment(contact)) return law_of(moment(contact));
     ContactLaw law{pair(contact).friction, pair(contact).restitution};
     law.conveys = conveys(pair(contact).first) || conveys(pair(contact).second);
     return law;
+  }
+
+  double holding(int contact) const override {
+    return holding_.empty() || !is_pair(contact) ? law(contact).friction : holding_[at(contact)];
   }
 
   void set(double t, const double* q, const double* u) override;
@@ -129,6 +139,9 @@ class SceneModel final : public Model {
   /// Laws of joints, some of which are contacts.
   const joints::JointLaws& joint_laws() const { return laws_.all(); }
   int joint_law(int contact) const { return laws_.place(contact - pairs()); }
+  const effects::CapstanSlip* slip_law(int contact) const {
+    return is_law(contact) ? joint_laws().slip(joint_law(contact)) : nullptr;
+  }
   /// The same, in world axes: the force or moment on the first body.
   Vector3d law_direction(int contact) const {
     return laws_.direction(contact - pairs(), bodies_.all());
@@ -136,7 +149,7 @@ class SceneModel final : public Model {
   const smooth::MovingBodies& bodies() const { return bodies_; }
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
   double potential() const;
-  /// Adds the force of a closed contact that is a law of a joint to the force of that joint.
+  /// Adds the force of a closed contact that is a law of a joint or cable to the force of that.
   void add_law_force(int contact, const VectorXd& parts, Forces& out) const;
   /// Forces of joints, by the multipliers of their rows, and of springs, at the state that is set.
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
@@ -154,6 +167,7 @@ class SceneModel final : public Model {
     return {moment.length, 0, -1, moment.pair, moment.spin};
   }
   void add_moments();
+  void find_holding(const Scene& scene);
   bool conveys(int body) const { return !surface_.empty() && surface_[at(body)].has_value(); }
   Vector3d relative_velocity(const FeaturePair& pair, const Touch& touch) const;
   /// Velocity of the surface of a body at a point, and its rate where the point moves.
@@ -170,8 +184,9 @@ class SceneModel final : public Model {
   std::vector<std::unique_ptr<Force>> forces_;
   std::vector<double> kinks_;  // of forces, by time
   std::vector<FeaturePair> pairs_;
+  std::vector<double> holding_;                       // by pair; empty: as friction
   std::vector<std::optional<SurfaceSpeed>> surface_;  // by body, of Bodies; empty: none
-  std::vector<std::string> body_names_, joint_names_;
+  std::vector<std::string> body_names_, joint_names_, spring_names_;
   LawContacts laws_;
   std::vector<Moment> moments_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen

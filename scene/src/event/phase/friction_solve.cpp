@@ -193,6 +193,22 @@ bool solve_compliant(const std::vector<bool>& closed, double none, FrictionProbl
   return false;
 }
 
+/// Whether parts that should hold slip, which have the other coefficient from here on.
+bool let_slip(const ContactRows& rows, double none, const FrictionSolution& answer,
+              FrictionProblem& problem) {
+  bool any = false;
+  for (std::size_t k = 0; k < problem.parts.size(); ++k) {
+    ConePart& p = problem.parts[k];
+    const double slips = rows.parts()[k].mu;
+    if (!(p.mu > slips) || answer.regimes[k] != Regime::sliding ||
+        p.slip_of(answer.w).norm() <= none)
+      continue;
+    p.mu = slips;
+    any = true;
+  }
+  return any;
+}
+
 /// All held if the law has any forces for that, else by an iteration, whose answer is settled where
 /// `decides` and forces are shared in several ways.
 FrictionSolution solve_shared(FrictionProblem& problem, const std::vector<VectorXd>& slides,
@@ -237,9 +253,15 @@ AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<Ve
   problem.b -= problem.A * known;
   AccelerationSolution out;
   out.scale = problem.b.cwiseAbs().maxCoeff();
-  out.contacts = solve_shared(problem, turning, part * out.scale,
-                              kFarAbove * std::max(out.scale, 1e-12), closed, !closed.empty());
-  if (!out.contacts.solved) return out;
+  for (std::size_t k = 0; k < slides.size(); ++k)
+    if (slides[k].size() == 0) problem.parts[k].mu = problem.parts[k].holding;
+  const VectorXd b = problem.b;
+  do {
+    problem.b = b;
+    out.contacts = solve_shared(problem, turning, part * out.scale,
+                                kFarAbove * std::max(out.scale, 1e-12), closed, !closed.empty());
+    if (!out.contacts.solved) return out;
+  } while (let_slip(rows, kNoChange * out.scale, out.contacts, problem));
   out.contacts.x += known;
   for (std::size_t k = 0; k < slides.size(); ++k)
     if (turning[k].size() < slides[k].size()) out.contacts.regimes[k] = Regime::sliding;
@@ -294,6 +316,7 @@ void ContactRows::take_rows() {
     p.first = rows;
     p.slips = law.is_line() ? 1 : kinematics[k].tangents.isZero(0) ? 0 : model_.tangents();
     p.mu = law.is_bounded() ? 0 : law.friction;
+    p.holding = law.is_bounded() ? 0 : model_.holding(contacts_[k]);
     p.bound = std::max(0.0, law.bound);
     if (law.has_normal()) p.normal = rows;
     if (law.is_moment())

@@ -319,7 +319,7 @@ std::vector<VectorXd> Motion::slides() const {
 bool Motion::forces_are_lawful() const {
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int contact = static_cast<int>(k);
-    const double normal = normal_force(contact), mu = model_.law(closed_[k]).friction;
+    const double normal = normal_force(contact), mu = friction(k);
     if (!(normal >= 0 && friction_force(contact).norm() <= mu * normal * (1 + kNoForce)))
       return false;
   }
@@ -340,7 +340,7 @@ std::vector<VectorXd> Motion::contact_forces() {
     largest = std::max(largest, force.norm());
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const double least = -kNoForce * largest, mu = model_.law(closed_[k]).friction;
+    const double least = -kNoForce * largest, mu = friction(k);
     lawful =
         lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(tangents_).norm() >= least;
   }

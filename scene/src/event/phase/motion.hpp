@@ -164,6 +164,9 @@ class Motion {
   bool sticks(std::size_t closed) const {
     return modes_[index(closed_[closed])].mode == Mode::stick;
   }
+  double friction(std::size_t closed) const {
+    return sticks(closed) ? model_.holding(closed_[closed]) : model_.law(closed_[closed]).friction;
+  }
   /// Its rows: from row_of_ on the normal, then the tangents where it sticks.
   int normals_of(std::size_t closed) const {
     return model_.law(closed_[closed]).has_normal() ? 1 : 0;

@@ -26,6 +26,7 @@ struct ConePart {
   int first = 0, slips = 0;
   int normal = -1;  ///< the row of x_n; -1: there is none
   double mu = 0, bound = 0;
+  double holding = 0;  ///< mu without slip
 
   bool has_normal() const { return normal == first; }
   bool is_held() const { return normal >= 0 && normal != first; }

@@ -71,7 +71,7 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
     const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
     if (stuck && single) add(Watch::cone, i, place, false);
     if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
-    if (!stuck && motion_.model().law(i).friction > 0) add(Watch::slip, i, place, false);
+    if (!stuck && motion_.model().holding(i) > 0) add(Watch::slip, i, place, false);
   }
   if (motion_.is_hyperstatic()) add(Watch::support, -1, -1, false);
   evaluate(t, y, 0);
@@ -121,7 +121,7 @@ double Watcher::of_state(Function& f) {
     case Watch::normal_force:
       return motion_.normal_force(f.closed);
     case Watch::cone:
-      return motion_.model().law(f.contact).friction * motion_.normal_force(f.closed) -
+      return motion_.model().holding(f.contact) * motion_.normal_force(f.closed) -
              motion_.friction_force(f.closed).norm();
     case Watch::border:
       return motion_.model().margin(f.contact) - f.level;
@@ -274,13 +274,14 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
 }
 
 // Accelerations of contacts that can no longer rest begin at zero and grow; by their rate where
-// they leave the band.
+// they leave the band. They jump where friction falls as contacts slip, which is when it happens.
 double Watcher::lag(Phase& phase, const Function& f, double time) {
   const double later = time + 0.01 * (phase.step_end() - time);
   if (!(later > time)) return 0;
   VectorXd y;
   phase.projected_at(time, y);
   const double here = value(f, phase.start() + time, y);
+  if (here < -2 * kFewOfBand * support_band_) return 0;
   phase.projected_at(later, y);
   const double growth = (here - value(f, phase.start() + later, y)) / (later - time);
   return growth > 0 ? std::min((support_band_ - here) / growth, phase.start() + time) : 0;

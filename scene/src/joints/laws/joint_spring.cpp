@@ -67,8 +67,9 @@ void each_part(const Table& table, const F& f) {
 
 // f(gains)
 template <class F>
-void each_of(const JointSpring& spring, const F& f) {
+void each_of(const JointSpring& spring, bool turns, const F& f) {
   if (spring.stiffness > 0 || spring.damping > 0) f(Gains(spring));
+  if (turns) return;  // the turn of a ball has a table as a whole
   each_part(spring.stiffness_table, [&](double slope, double middle, double bound) {
     Gains part;
     part.stiffness = slope;
@@ -91,7 +92,9 @@ template <class F>
 void each_gains(const Scene& scene, const F& f) {
   for (std::size_t j = 0; j < scene.joints.size(); ++j) {
     const Joint& joint = scene.joints[j];
-    if (joint.spring) each_of(*joint.spring, [&](const Gains& gains) { f(joint, j, gains); });
+    if (joint.spring)
+      each_of(*joint.spring, joints::type(joint.kind).turns_freely(),
+              [&](const Gains& gains) { f(joint, j, gains); });
     if (joint.motor && joint.motor->has_gains()) f(joint, j, Gains(*joint.motor));
   }
 }
@@ -189,14 +192,14 @@ bool is_table(const Table& table) {
   return last[1] > 0;
 }
 
-void table_fields(const files::Form& form, const char* gain, bool is_free, const Unit& number,
+void table_fields(const files::Form& form, const char* gain, const char* only, const Unit& number,
                   const Unit& force, Table& table) {
   const std::string key = std::string(gain) + "_table";
   form.rows(key, table, kMostRows, number, force);
   files::Fields* in = form.in();
   if (!in || !in->has(key)) return;
-  if (!is_free)
-    in->wrong(key, "is of hinges and sliders");
+  if (only)
+    in->wrong(key, only);
   else if (in->has(gain))
     in->wrong(key, fmt::format("give {} or {}, not both", gain, key));
   else if (!is_table(table))
@@ -217,9 +220,10 @@ class JointSpringEffect : public JointLawEffect {
     form.table("spring", joint.spring, [&](const files::Form& in, JointSpring& spring) {
       if (in.in() || spring.stiffness_table.empty()) stiffness(in, angle, spring.stiffness);
       if (in.in() || spring.damping_table.empty()) damping(in, angle, spring.damping);
-      table_fields(in, "stiffness", is_free, angle ? Unit{} : kMetres, force,
+      table_fields(in, "stiffness", nullptr, angle ? Unit{} : kMetres, force,
                    spring.stiffness_table);
-      table_fields(in, "damping", is_free, angle ? kTurning : kSpeed, force, spring.damping_table);
+      table_fields(in, "damping", is_free ? nullptr : "is of hinges and sliders",
+                   angle ? kTurning : kSpeed, force, spring.damping_table);
       if (files::Fields* read = in.in(); read && !(spring.stiffness > 0 || spring.damping > 0) &&
                                          !read->has("stiffness_table") &&
                                          !read->has("damping_table"))
@@ -265,7 +269,7 @@ class JointSpringEffect : public JointLawEffect {
       stretch -= gains.offset;
       out.sprung(number, stretch, gains.stiffness, gains.damping, gains.rate, gains.bound);
     };
-    if (joint.spring) each_of(*joint.spring, add);
+    if (joint.spring) each_of(*joint.spring, joints::type(joint.kind).turns_freely(), add);
     if (joint.motor && joint.motor->has_gains()) add(Gains(*joint.motor));
   }
 };
