@@ -11,10 +11,13 @@
 #include <problems/akzo_nobel.hpp>
 #include <problems/car_axis.hpp>
 #include <problems/lotka_volterra.hpp>
+#include <problems/nand_gate.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/rigid_body.hpp>
 #include <problems/robertson.hpp>
 #include <problems/two_bit_adder.hpp>
+#include <problems/water_tube.hpp>
+#include <problems/wheelset.hpp>
 
 #include "projection/run.hpp"
 
@@ -30,6 +33,9 @@ problems::Problem problem_of(const std::string& name, const std::string& form) {
   if (name == "akzo nobel") return akzo_nobel();
   if (name == "rigid body") return rigid_body("dzhanibekov", 100.0);
   if (name == "robertson") return robertson(4e5, form);
+  if (name == "nand gate") return nand_gate(form);
+  if (name == "water tube") return water_tube();
+  if (name == "wheelset") return wheelset();
   if (name == "two-bit adder") return two_bit_adder();
   if (name == "lotka volterra") return lotka_volterra(2, 0.5, 100);
   throw std::invalid_argument("one_run: no problem is called " + name);
