@@ -17,7 +17,7 @@ awk -v body="$body" -v pair="$pair" 'BEGIN {
     printf "[[body]]\nname = \"ball %d\"\nposition = [%d.25, %d, %d]\n%s\n", k, k % 50, k / 50 % 50, k / 2500, body
   printf "%s", pair
 }' >each.toml
-printf '[[body]]\nname = "ball"\n%brepeat = [{ count = 250, step = [1, 0, 0] }, { count = 400, step = [0, 1, 0] }]\n%b' \
+printf '[[body]]\nname = "ball"\nposition = [0, 0, 0]\n%brepeat = [{ count = 250, step = [1, 0, 0] }, { count = 400, step = [0, 1, 0] }]\n%b' \
   "$body" "$pair" >repeated.toml
 
 ulimit -d 180000 # kB

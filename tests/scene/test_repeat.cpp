@@ -128,6 +128,10 @@ TEST_CASE("repetitions that are wrong, or too many, are refused by place before 
   std::string points;
   for (int k = 0; k < 1000; ++k) points += "[0, 0, 1], ";
   refused("{ count = 5000 }\npoints = [" + points + "]", "numbers and texts");
+  const std::string nowhere = kHead + "[[body]]\nname = \"b\"\nmass = 1\ninertia = [1, 1, 1]\n";
+  CHECK(error(nowhere + "repeat = { count = 2, step = [0, 1e-3, 0] }\n")
+            .find("moves position or at: give one of them") != std::string::npos);
+  CHECK(error(nowhere + "repeat = { count = 2 }\n").empty());
   // Together, too; and kinds that have no repetition do not know the word.
   std::string many = kHead;
   for (int k = 0; k < 3; ++k)

@@ -57,6 +57,14 @@ class Repetition {
 
   std::size_t count() const { return count_; }
 
+  /// Refuses steps that would move nothing: all copies would be at one place.
+  void demand_place(Value& element) const {
+    if (find_entry(element, "position") != nullptr || find_entry(element, "at") != nullptr) return;
+    for (const Row& row : rows_)
+      if (row.step != std::array<double, 3>{})
+        wrong("has a step, which moves position or at: give one of them");
+  }
+
   /// The last direction is the fastest.
   Value copy(const Value& element, std::size_t number) const {
     std::array<long, 3> at{};
@@ -193,6 +201,7 @@ void repeat_elements(Value& document, const std::string& file) {
         continue;
       }
       const Repetition repetition(*repeat, fmt::format("{} {}", kind, k + 1), file);
+      repetition.demand_place(item);
       made += repetition.count();
       copied += repetition.count() * size_of(item);
       if (made > kMostListed || copied > kMostCopied)
