@@ -282,11 +282,18 @@ TEST_CASE("joints in steps: light links swing with heavy loads as the smooth eng
 }
 
 TEST_CASE("joints in steps: a slack chain that snaps taut keeps nearly all of its energy") {
-  const Scene s = loaded_chain(3, GENERATE(1e3, 1e4, 1e5, 1e6));
+  const auto [ratio, step, part] = GENERATE(table<double, double, double>({{1e3, 1e-3, 0.02},
+                                                                           {1e4, 1e-3, 0.02},
+                                                                           {1e5, 1e-3, 0.02},
+                                                                           {1e6, 1e-3, 0.02},
+                                                                           {1e6, 1e-2, 0.1}}));
+  INFO(ratio << ", " << step);
+  Scene s = loaded_chain(3, ratio);
+  s.stepping->step = step;
   const auto steps = make_engine(s);
   const double start = steps->diagnostics().potential_energy;
   steps->advance(2);
   const Diagnostics now = steps->diagnostics();
   // The load falls by 0.2 m to 0.4 m.
-  CHECK(std::abs(now.kinetic_energy + now.potential_energy - start) < 0.02 * 100 * kGravity * 0.3);
+  CHECK(std::abs(now.kinetic_energy + now.potential_energy - start) < part * 100 * kGravity * 0.3);
 }
