@@ -70,8 +70,8 @@ cores=$(nproc)  # asked before OMP_NUM_THREADS changes its answer
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 if [ "$quick" = yes ]; then
-  accuracy='--count 6 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of'
-  again='--count 4 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of,long,chain'
+  accuracy='--count 5 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of'
+  again='--count 3 --repeats 1 --seconds 0.1 --no-drift --no-reach --skip four_bar_of,long,chain'
   sweep='--count 20 --problem pendulum,car_axis,andrews --skip long' peers=
 else
   accuracy='--count 8 --repeats 3 --seconds 1'
