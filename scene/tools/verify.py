@@ -202,8 +202,9 @@ class Judge:
 
     def head(self, word, n, text):
         if word == "body":
-            if self.bodies.setdefault(n[0], Body(n, text)).mass != n[1]:
+            if n[0] in self.bodies:
                 raise Damaged(f"body {n[0]:g} is told twice")
+            self.bodies[n[0]] = Body(n, text)
         elif word == "surface":
             self.bodies[n[0]].surface = V(n[1:4]), V(n[4:7]), V(n[7:10])
         elif word == "pair":

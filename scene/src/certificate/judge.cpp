@@ -57,30 +57,24 @@ void Judge::expect(const char* law, double amount, double bound, const std::stri
                                         when_, what, law, amount, bound));
 }
 
-void Judge::head_of_bodies(const Record& line) {
-  const std::vector<double>& n = line.numbers;
-  if (line.word == "body") {
-    JudgedBody b;
-    b.mass = n[1];
-    b.inertia << n[2], n[7], n[6], n[7], n[3], n[5], n[6], n[5], n[4];
-    b.material = n[8] >= 0 && n[8] < 1e9 ? static_cast<int>(n[8]) : -1;
-    b.name = line.text;
-    if (!(b.mass >= 0) || (b.mass > 0 && !(std::abs(b.inertia.determinant()) > 0)))
-      throw Damaged("body " + b.name + " has no mass or inertia that moves");
-    bodies_[n[0]] = std::move(b);
-  } else if (line.word == "surface") {
-    JudgedBody& b = body(n[0]);
-    b.belt = vector(n, 1), b.belt_turn = vector(n, 4), b.axis = vector(n, 7);
-  } else if (line.word == "pair") {
-    if (!(std::abs(n[0]) < 1e9 && std::abs(n[1]) < 1e9)) throw Damaged("a pair of no materials");
-    pairs_[{static_cast<int>(n[0]), static_cast<int>(n[1])}] = {n[2], n[3], n[4], n[5], n[6]};
-  }
-}
-
 void Judge::head(const Record& line) {
   const std::vector<double>& n = line.numbers;
   const std::string& word = line.word;
-  head_of_bodies(line);
+  if (word == "body") {
+    JudgedBody b;
+    b.mass = n[1];
+    b.inertia << n[2], n[7], n[6], n[7], n[3], n[5], n[6], n[5], n[4];
+    b.material = n[8];
+    b.name = line.text;
+    if (!(b.mass >= 0) || (b.mass > 0 && !(std::abs(b.inertia.determinant()) > 0)))
+      throw Damaged("body " + b.name + " has no mass or inertia that moves");
+    if (!bodies_.emplace(n[0], b).second) throw Damaged("body " + b.name + " is told twice");
+  }
+  if (word == "surface") {
+    JudgedBody& b = body(n[0]);
+    b.belt = vector(n, 1), b.belt_turn = vector(n, 4), b.axis = vector(n, 7);
+  }
+  if (word == "pair") pairs_[{n[0], n[1]}] = {n[2], n[3], n[4], n[5], n[6]};
   if (word == "gravity") gravity_ = vector(n, 0);
   if (word == "engine") {
     joints_.clear(), reacts_.clear(), past_.clear();

@@ -61,7 +61,7 @@ struct Load {
 
 struct JudgedBody {
   double mass = 0;
-  int material = -1;
+  double material = -1;
   Matrix3d inertia = Matrix3d::Zero();
   std::string name;
   std::optional<Told> state;
@@ -134,7 +134,6 @@ class Judge {
   using Loads = std::map<double, Load>;
 
   void head(const Record& line);
-  void head_of_bodies(const Record& line);
   void finish();
   void end_of_step(std::optional<double> start);
   void expect(const char* law, double amount, double bound, const std::string& what);
@@ -175,7 +174,7 @@ class Judge {
 
   Verdict verdict_;
   std::map<double, JudgedBody> bodies_;
-  std::map<std::pair<int, int>, JudgedPair> pairs_;
+  std::map<std::pair<double, double>, JudgedPair> pairs_;
   std::map<double, JudgedJoint> joints_;
   std::map<double, double> reacts_;  // joints, and behind them those of couplings
   Vector3d gravity_ = Vector3d::Zero();

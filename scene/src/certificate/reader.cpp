@@ -14,35 +14,15 @@ namespace {
 
 constexpr std::size_t kLongest = std::size_t{1} << 16;  // bytes of a line
 
-/// Numbers of a line; whether more may follow, or a text.
-struct Form {
-  std::size_t numbers;
-  bool more = false, text = false;
-};
-
-const std::map<std::string, Form, std::less<>>& forms() {
-  static const std::map<std::string, Form, std::less<>> all = {{"body", {9, false, true}},
-                                                               {"surface", {10}},
-                                                               {"pair", {7}},
-                                                               {"gravity", {3}},
-                                                               {"engine", {0, false, true}},
-                                                               {"joint", {23, false, true}},
-                                                               {"coupled", {3, true}},
-                                                               {"step", {5}},
-                                                               {"part", {4}},
-                                                               {"trial", {4}},
-                                                               {"extrapolated", {1}},
-                                                               {"start", {1}},
-                                                               {"instant", {2}},
-                                                               {"arrives", {1}},
-                                                               {"push", {7, false, true}},
-                                                               {"contact", {22}},
-                                                               {"pull", {14}},
-                                                               {"law", {10, true}},
-                                                               {"placed", {8}},
-                                                               {"to", {14}},
-                                                               {"rate", {7}},
-                                                               {"end", {1}}};
+// Numbers of a line; "+": or more; "t": then a text.
+const std::map<std::string, std::string>& forms() {
+  static const std::map<std::string, std::string> all = {
+      {"body", "9t"},   {"surface", "10"}, {"pair", "7"},         {"gravity", "3"},
+      {"engine", "0t"}, {"joint", "23t"},  {"coupled", "3+"},     {"step", "5"},
+      {"part", "4"},    {"trial", "4"},    {"extrapolated", "1"}, {"start", "1"},
+      {"instant", "2"}, {"arrives", "1"},  {"push", "7t"},        {"contact", "22"},
+      {"pull", "14"},   {"law", "10+"},    {"placed", "8"},       {"to", "14"},
+      {"rate", "7"},    {"end", "1"}};
   return all;
 }
 
@@ -74,10 +54,12 @@ bool Reader::next(Record& out) {
   out.word = line.substr(0, blank);
   const auto form = forms().find(out.word);
   if (form == forms().end()) refuse("its first word is none of a certificate");
+  const std::size_t least = std::stoul(form->second);
+  const bool more = form->second.back() == '+', text = form->second.back() == 't';
   out.numbers.clear();
   out.text.clear();
   const char *at = line.data() + blank, *end = line.data() + line.size();
-  while (at < end && (form->second.more || out.numbers.size() < form->second.numbers)) {
+  while (at < end && (more || out.numbers.size() < least)) {
     double x = 0;
     const auto [behind, error] = std::from_chars(at + 1, end, x);
     // Bounds of laws may be infinite; they are the sixth number.
@@ -87,9 +69,9 @@ bool Reader::next(Record& out) {
     out.numbers.push_back(x);
     at = behind;
   }
-  if (at < end && form->second.text) out.text.assign(at + 1, end);
-  if (out.numbers.size() < form->second.numbers || (at < end && !form->second.text))
-    refuse(fmt::format("{} has {} numbers", out.word, form->second.numbers));
+  if (at < end && text) out.text.assign(at + 1, end);
+  if (out.numbers.size() < least || (at < end && !text))
+    refuse(fmt::format("{} has {} numbers", out.word, least));
   ended_ = out.word == "end";
   if (ended_ && out.numbers[0] != static_cast<double>(line_ - 1))
     refuse(fmt::format("{} lines should come before it: a part is missing", out.numbers[0]));
