@@ -137,8 +137,8 @@ void JointFrequency::follow(double acceleration) {
 }
 
 bool JointFrequency::resolves_change(double dt) const {
-  const double turn = memory_.frequency * dt;
-  return !(turn * turn * std::abs(1 - at_end_ / memory_.frequency) > kChangeOfEnergy);
+  const double change = std::abs(memory_.frequency - at_end_) * dt;
+  return !(memory_.frequency * dt * change > kChangeOfEnergy);
 }
 
 }  // namespace tether::contact::detail
