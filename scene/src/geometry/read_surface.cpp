@@ -24,11 +24,11 @@ bool from_file(Fields& in, Reader& r, const Parse& parse) {
   const std::string name = in.input_name("file");
   if (name.empty()) return false;
   try {
-    std::string path;
-    const std::string text = read_beside(in.place().file, name, path);
     if (r.surface_bytes > kMostBytes)
       throw SurfaceError(
           "comes after 256 MiB of surfaces that other bodies of the scene have read");
+    std::string path;
+    const std::string text = read_beside(in.place().file, name, path);
     r.surface_bytes += text.size();
     r.surface_files.insert(path);
     parse(name, text);
