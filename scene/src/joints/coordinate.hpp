@@ -270,7 +270,7 @@ class JointLaws {
   };
   void place(int item, double sign, const Bodies& bodies, contact::JointLaws& out);
   double value(const Item& item, const Bodies& bodies) const;
-  double turn(int ball, const Bodies& bodies) const;
+  double turn(std::size_t component, const Bodies& bodies) const;  // of a ball
   const Item& item(int law) const { return joints_[at(placed_[at(law)].item)]; }
 
   std::vector<Item> joints_;                 // a ball is three

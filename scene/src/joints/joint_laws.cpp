@@ -95,13 +95,13 @@ double JointLaws::value(const Item& item, const Bodies& bodies) const {
   return value + turn * std::round((middle - value) / turn);
 }
 
-double JointLaws::turn(int joint, const Bodies& bodies) const {
+// Its components stand one after the other.
+double JointLaws::turn(std::size_t component, const Bodies& bodies) const {
+  const int ball = joints_[component].joint;
+  while (component > 0 && joints_[component - 1].joint == ball) --component;
   double square = 0;
-  for (const Item& each : joints_) {
-    if (each.joint != joint) continue;
-    const double component = each.coordinate.value(bodies);
-    square += component * component;
-  }
+  for (; component < joints_.size() && joints_[component].joint == ball; ++component)
+    square += std::pow(joints_[component].coordinate.value(bodies), 2);
   return std::sqrt(square);
 }
 
@@ -112,7 +112,7 @@ void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
     const Item& item = joints_[k];
     const double at_now = value(item, bodies);
     list.on = [&](double sign) { place(static_cast<int>(k), sign, bodies, out); };
-    if (item.law.spring && item.coordinate.is_component()) list.turn = turn(item.joint, bodies);
+    if (item.law.spring && item.coordinate.is_component()) list.turn = turn(k, bodies);
     for (const effects::Effect* each : effects::all())
       each->add_laws(item.law, item.joint, at_now, list);
   }

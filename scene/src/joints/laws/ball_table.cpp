@@ -6,6 +6,7 @@
 #include "bounds.hpp"
 #include "joints/coordinate.hpp"
 #include "joints/joint_type.hpp"
+#include "joints/laws/force_table.hpp"
 #include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
@@ -13,8 +14,6 @@ namespace tether::scene::effects {
 using namespace mechanics;
 
 namespace {
-
-using Table = std::vector<std::array<double, 2>>;
 
 bool has_table(const Joint& joint) {
   return joint.spring && !joint.spring->stiffness_table.empty() &&
@@ -26,18 +25,16 @@ double number(const Dual& x) { return x.value(); }
 
 /// The moment over the turn, of which this is the square.
 template <class S>
-S softened(const Table& table, const S& square) {
+S softened(const ForceTable& table, const S& square) {
   using std::sqrt;
-  std::array<double, 2> last{0, 0};
-  for (const std::array<double, 2>& row : table) {
-    const double slope = (row[1] - last[1]) / (row[0] - last[0]);
-    if (number(square) < row[0] * row[0]) {
-      if (last[0] == 0) return S(slope);
-      return S(slope + (last[1] - slope * last[0]) / sqrt(square));
-    }
-    last = row;
-  }
-  return S(last[1] / sqrt(square));
+  const auto to = std::find_if(table.begin(), table.end(), [&square](const auto& row) {
+    return number(square) < row[0] * row[0];
+  });
+  if (to == table.end()) return S(table.back()[1] / sqrt(square));
+  if (to == table.begin()) return S((*to)[1] / (*to)[0]);
+  const auto from = to - 1;
+  const double k = slope(*from, *to);
+  return S(k + ((*from)[1] - k * (*from)[0]) / sqrt(square));
 }
 
 /// The table of one ball.
@@ -45,7 +42,7 @@ struct BallTable {
   int first, second;
   std::size_t joint;
   std::vector<joints::Coordinate> turn;  // its components
-  Table table;
+  ForceTable table;
 
   template <class S>
   Vector3<S> moment(const Frame<S>& A, const Frame<S>& B) const {
@@ -65,16 +62,12 @@ struct BallTable {
   double potential(double, const Frame<double>& A, const Frame<double>& B) const {
     double square = 0, sum = 0;
     for (const joints::Coordinate& each : turn) square += std::pow(each.value(A, B), 2);
-    const double to = std::sqrt(square);
-    std::array<double, 2> last{0, 0};
-    for (const std::array<double, 2>& row : table) {
-      const double end = std::min(to, row[0]), slope = (row[1] - last[1]) / (row[0] - last[0]);
-      const double way = end - last[0];
-      if (!(way > 0)) return sum;
-      sum += way * (last[1] + 0.5 * slope * way);
-      last = row;
-    }
-    return sum + std::max(0.0, to - last[0]) * last[1];
+    const double turned = std::sqrt(square);
+    each_piece(table, [&](const auto& from, const auto& to) {
+      const double way = std::min(turned, to[0]) - from[0];
+      if (way > 0) sum += way * (from[1] + 0.5 * slope(from, to) * way);
+    });
+    return sum + std::max(0.0, turned - table.back()[0]) * table.back()[1];
   }
   bool works() const { return false; }
   template <class S>
@@ -120,10 +113,10 @@ class BallTableEffect : public Effect {
   }
   void take_rates(const Scene& scene, double length, double mass, Largest& rate) const override {
     for (const Joint& each : scene.joints)
-      if (has_table(each)) {
-        const std::array<double, 2>& row = each.spring->stiffness_table.front();
-        rate.take(std::sqrt(row[1] / row[0] / (mass * length * length)));
-      }
+      if (has_table(each))
+        each_piece(each.spring->stiffness_table, [&](const auto& from, const auto& to) {
+          rate.take(std::sqrt(slope(from, to) / (mass * length * length)));
+        });
   }
   void add_laws(const Joint& joint, int number, double value, JointLawList& out) const override {
     if (!has_table(joint)) return;

@@ -17,6 +17,7 @@
 
 #include "bounds.hpp"
 #include "joints/coordinate.hpp"
+#include "joints/laws/force_table.hpp"
 #include "joints/laws/joint_law_effect.hpp"
 #include "mechanics/pair_forces.hpp"
 
@@ -46,23 +47,18 @@ struct Gains {
 
 bool has_spring(const Joint& joint) { return joint.spring.has_value(); }
 
-using Table = std::vector<std::array<double, 2>>;
-
 // f(slope, middle, bound) of each part.
 template <class F>
-void each_part(const Table& table, const F& f) {
-  std::array<double, 2> last{0, 0};
-  for (const std::array<double, 2>& row : table) {
-    const double rise = row[1] - last[1], slope = rise / (row[0] - last[0]);
-    const double middle = (row[0] + last[0]) / 2;
-    if (rise > 0 && last[0] > 0) {
-      f(slope, middle, rise / 2);
-      f(slope, -middle, rise / 2);
+void each_part(const ForceTable& table, const F& f) {
+  each_piece(table, [&f](const auto& from, const auto& to) {
+    const double rise = to[1] - from[1], middle = (to[0] + from[0]) / 2;
+    if (rise > 0 && from[0] > 0) {
+      f(slope(from, to), middle, rise / 2);
+      f(slope(from, to), -middle, rise / 2);
     } else if (rise > 0) {
-      f(slope, 0.0, rise);
+      f(slope(from, to), 0.0, rise);
     }
-    last = row;
-  }
+  });
 }
 
 // f(gains)
@@ -183,7 +179,7 @@ class JointSprings : public PairForces<Sprung> {
 constexpr std::size_t kMostRows = 100;
 
 // Rows of numbers above 0 that grow, and forces that do not fall, the last above 0.
-bool is_table(const Table& table) {
+bool is_table(const ForceTable& table) {
   std::array<double, 2> last{0, 0};
   for (const std::array<double, 2>& row : table) {
     if (!(row[0] > last[0] && row[1] >= last[1])) return false;
@@ -193,7 +189,7 @@ bool is_table(const Table& table) {
 }
 
 void table_fields(const files::Form& form, const char* gain, const char* only, const Unit& number,
-                  const Unit& force, Table& table) {
+                  const Unit& force, ForceTable& table) {
   const std::string key = std::string(gain) + "_table";
   form.rows(key, table, kMostRows, number, force);
   files::Fields* in = form.in();
