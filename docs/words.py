@@ -17,7 +17,8 @@ LONGEST_SENTENCE, LONGEST_PARAGRAPH, MOST_TERMS = 35, 120, 15
 # Words of a document, formulas and programs included.
 LENGTHS = {"README.md": 900, "benchmarks/README.md": 1500, "docs/method": 4000, "python/README.md": 2500,
            "ida_projection/README.md": 2500, "contact/README.md": 2500, "scene/README.md": 2500}
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+HERE = pathlib.Path(__file__).resolve()
+ROOT = HERE.parent.parent
 GLOSSARY = ROOT / "docs" / "glossary.md"
 SOURCES = {".cpp", ".hpp", ".h", ".c", ".in", ".py", ".m", ".js", ".cmake", ".sh", ".toml", ".f90", ".gp"}
 BLOCK = re.compile(r"^```.*?^```[ \t]*$", re.M | re.S)
@@ -35,6 +36,20 @@ def table_column(text, heading, column):
     part = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
     rows = [line.strip().strip("|").split("|") for line in part.splitlines() if line.startswith("|")]
     return [row[column].strip() for row in rows[2:]]
+
+
+class Replaced:
+    """Phrases that the glossary replaces, sought as one pattern."""
+
+    def __init__(self, glossary):
+        self.say = {phrase.strip().lower(): say
+                    for say, phrases in zip(table_column(glossary, "Say", 0), table_column(glossary, "Say", 1))
+                    for phrase in phrases.split(";")}
+        longest_first = sorted(self.say, key=len, reverse=True)
+        self.pattern = re.compile(rf"\b(?:{'|'.join(map(re.escape, longest_first))})\b", re.I)
+
+    def bad_in(self, words):
+        return [f'say "{self.say[phrase.lower()]}", not "{phrase}"' for phrase in self.pattern.findall(words)]
 
 
 def paragraphs(text):
@@ -97,9 +112,8 @@ def check_document(path, replaced):
         for sentence in sentences(words):
             if len(sentence.split()) > LONGEST_SENTENCE:
                 yield f"{path}:{line}: a sentence of {len(sentence.split())} words: {sentence[:60]}..."
-        for phrase, instead in replaced if path != GLOSSARY else ():
-            if re.search(rf"\b{re.escape(phrase)}\b", words, re.I):
-                yield f"{path}:{line}: say \"{instead}\", not \"{phrase}\""
+        if path != GLOSSARY:
+            yield from (f"{path}:{line}: {problem}" for problem in replaced.bad_in(words))
     for block in BLOCK.finditer(text):
         for number, line in enumerate(block.group().splitlines(), text.count("\n", 0, block.start()) + 1):
             if COMMENT.match(line):
@@ -152,13 +166,11 @@ def check_source(path, replaced):
     for number, line in enumerate(lines, 1):
         if COMMENT.match(line):
             yield f"{path}:{number}: a comment that begins with {COMMENT.match(line).group(1)}"
-        if path == pathlib.Path(__file__).resolve():
+        if path == HERE:
             break
         remark = REMARK.search(line)
         said = " ".join([remark.group() if remark else ""] + (STRING.findall(line) if room != "tests" else []))
-        for phrase, instead in replaced:
-            if re.search(rf"\b{re.escape(phrase)}\b", said, re.I):
-                yield f"{path}:{number}: say \"{instead}\", not \"{phrase}\""
+        yield from (f"{path}:{number}: {problem}" for problem in replaced.bad_in(said))
         if not remark:
             continue
         more = re.match(r"\s*//+ (.*)", lines[number]) if remark.group().endswith(",") and number < len(lines) else None
@@ -176,9 +188,7 @@ def check_source(path, replaced):
 def main(names):
     glossary = GLOSSARY.read_text()
     terms = table_column(glossary, "Terms", 0)
-    replaced = [(phrase.strip(), say)
-                for say, phrases in zip(table_column(glossary, "Say", 0), table_column(glossary, "Say", 1))
-                for phrase in phrases.split(";")]
+    replaced = Replaced(glossary)
     problems = [f"{GLOSSARY}: {len(terms)} terms, {MOST_TERMS} are allowed"] if len(terms) > MOST_TERMS else []
     count = 0
     for name in names:
