@@ -246,7 +246,8 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
   current_weights(yy);
   const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
   point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
-  const bool turned = report.status == Status::success && ydot && point_.tangent(t, ydot, report);
+  const bool turned = report.status == Status::success && ydot &&
+                      point_.tangent(t, y, ydot, variables_.id(), report);
   if (report.status != Status::success) return report;
   note_changes(report, yy, y, turned ? yp : nullptr, ydot);
   N_VScale(1.0, y, yy);

@@ -77,14 +77,14 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
   if (unknowns_.contiguous) candidate.with_entries();
   if (!run_.engaged || movers_.joined.mover() != nullptr) movers_.joined.begin(candidate);
   corrector_.begin(mem);
-  if (movers_.used != nullptr) movers_.used->rows().forget_failure();
+  if (movers_.used != nullptr) movers_.used->rows().report.fatal = false;
   control_.restore_weights(weights, attempts_.steps);
   const bool probes = inquiry_ != nullptr;
   int flag = probes ? answer_inquiry(candidate) : step(candidate, tolerance, call_setup);
   if (flag == 0 && !probes) choose_step(candidate);
   // A failed evaluation of the plugin's own does no harm, but a fatal flag ends the run.
   const bool ended =
-      corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().fatal());
+      corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().report.fatal);
   if (flag >= 0 && ended) flag = finish(Status::callback_fatal, movers_.used->message());
   return corrector_.stopped() ? corrector_.stop_flag() : flag;
 }
@@ -99,7 +99,7 @@ void Projection::Impl::choose_step(const Candidate& candidate) {
   const bool long_move = in_use(Mechanism::tested_long_moves) && std::isfinite(attempts_.moved) &&
                          attempts_.moved > options_.advanced.largest_move &&
                          attempts_.moved > kSudden * attempts_.accepted_move &&
-                         movers_.used->rows().may_test_with_factors();
+                         movers_.used->rows().factors == RowsAt::Factors::of_all_rows;
   control_.control(candidate, steps, run_.engaged, suppressed ? variables_.tested() : nullptr,
                    suppressed ? variables_.id() : nullptr,
                    long_move ? polish_.corrected() : nullptr);
@@ -233,10 +233,10 @@ bool Projection::Impl::polishes_first() {
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, attempts_.left_before)) return;
   move.status = Status::move_too_long;
-  movers_.used->rows().message = "the move onto the constraints, capped at " + brief(move.length) +
-                                 " tolerances (Advanced::largest_move), leaves " +
-                                 brief(move.left) +
-                                 ", which the error test does not allow; use a larger largest_move";
+  movers_.used->rows().report.text =
+      "the move onto the constraints, capped at " + brief(move.length) +
+      " tolerances (Advanced::largest_move), leaves " + brief(move.left) +
+      ", which the error test does not allow; use a larger largest_move";
 }
 
 // Whether IDA accepted an attempt shows in its count of steps at the next one.

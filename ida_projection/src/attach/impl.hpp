@@ -238,7 +238,8 @@ class Projection::Impl {
   PointProjection point_;
   Watches watch_;
   Owned<SUNNonlinearSolver, SUNNonlinSolFreeEmpty> solver_;  // IDA sees it
-  std::unique_ptr<Companion> sensitivities_, gradient_;
+  std::unique_ptr<Companion> sensitivities_;
+  std::unique_ptr<RowsAt> gradient_;  // of project_gradient()
   Unknowns unknowns_;
   Metric wanted_metric_;
   MetricChoice metric_choice_;

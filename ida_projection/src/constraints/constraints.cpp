@@ -160,7 +160,7 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
   const int m = evaluator.rows();
   const auto require = [&](Status status) {
     if (status != Status::success)
-      throw std::invalid_argument("check_jacobian: " + evaluator.message());
+      throw std::invalid_argument("check_jacobian: " + evaluator.report.text);
   };
 
   std::vector<int> columns(static_cast<std::size_t>(n));

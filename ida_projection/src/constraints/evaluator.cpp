@@ -65,8 +65,8 @@ bool has_values(const Constraints& set) {
          !std::holds_alternative<DistributedRows>(set.jacobian);
 }
 
-Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics)
-    : constraints_(constraints), statistics_(statistics) {
+Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics, RowsReport* where)
+    : report(where != nullptr ? *where : own_), constraints_(constraints), statistics_(statistics) {
   flatten(constraints);
   g_base_.resize(static_cast<std::size_t>(rows_));
   g_shifted_.resize(static_cast<std::size_t>(rows_));
@@ -96,23 +96,18 @@ int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff
     std::copy(C, C + entries, into);
   }
   const int flag = fill(to, into);
-  if (g != nullptr && !part.g_room.end(g, count)) overrun_ = true;
-  if (check_jacobian_rows && !C_room_.end(C, entries)) overrun_ = true;
+  const bool within = (g == nullptr || part.g_room.end(g, count)) &
+                      (!check_jacobian_rows || C_room_.end(C, entries));
   part.C_checked |= check_jacobian_rows;
-  return overrun_ ? -1 : flag;
+  return within ? flag : kOverran;
 }
 
 Status Evaluator::checked(int flag, const char* what, const Part& part) {
   if (flag == 0) return Status::success;
-  message_ =
-      std::string(what) + " of " + constraints_.name(part.first_row) +
-      (overrun_ ? " writes past its end: Constraints::count is " + std::to_string(part.set->count)
-       : thrown_.empty() ? " returned " + std::to_string(flag)
-                         : " threw: " + thrown_);
+  const std::string function = std::string(what) + " of " + constraints_.name(part.first_row);
+  const Status status = report.failed(flag, function, thrown_, part.set->count);
   thrown_.clear();
-  overrun_ = false;
-  if (flag < 0) fatal_ = true;
-  return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+  return status;
 }
 
 int Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
@@ -122,7 +117,7 @@ int Evaluator::value_of(const Part& part, double t, const double* y, int n, doub
 }
 
 Status Evaluator::value(double t, const double* y, int n, double* g) {
-  if (fatal_) return Status::callback_fatal;
+  if (report.fatal) return Status::callback_fatal;
   ++statistics_.value_evaluations;
   const Part* at = nullptr;
   const int flag = guarded(
@@ -141,7 +136,7 @@ Status Evaluator::value(double t, const double* y, int n, double* g) {
 Status Evaluator::not_finite(double t, const double* g) {
   const long bad = first_not_finite(g, rows_);
   if (bad < 0) return Status::success;
-  message_ =
+  report.text =
       "g of " + constraints_.name(static_cast<int>(bad)) + " is not finite at t = " + brief(t);
   return Status::not_finite;
 }
@@ -179,7 +174,7 @@ int Evaluator::rows_of(const Part& part, double t, const double* y, int n, const
 template <class Place>
 Status Evaluator::all_rows(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* g, Place place) {
-  if (fatal_) return Status::callback_fatal;
+  if (report.fatal) return Status::callback_fatal;
   ++statistics_.jacobian_evaluations;
   if (g != nullptr) ++statistics_.value_evaluations;
   if (g != nullptr && gives_both_) ++statistics_.joint_evaluations;
@@ -200,15 +195,10 @@ Status Evaluator::all_rows(double t, const double* y, int n, const double* scale
   return g == nullptr ? Status::success : finite(t, g);
 }
 
+// Sparse rows are spread where all have been evaluated.
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* C, double* value) {
   std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
-  return jacobian_into_zeros(t, y, n, scale, columns, C, value);
-}
-
-// Sparse rows are spread where all have been evaluated.
-Status Evaluator::jacobian_into_zeros(double t, const double* y, int n, const double* scale,
-                                      const std::vector<int>& columns, double* C, double* value) {
   if (!has_sparse_)
     return all_rows(t, y, n, scale, columns, value, [&](const Part& part) {
       return C + static_cast<std::ptrdiff_t>(part.first_row) * n;
@@ -291,7 +281,7 @@ void Evaluator::sensitive(double t, const double* y, int n, const double* scale,
     if (!std::holds_alternative<FiniteDifferences>(part.set->jacobian)) continue;
     const int m = part.set->count;
     const auto evaluate = [&](double* g) {
-      if (fatal_) return false;
+      if (report.fatal) return false;
       ++statistics_.value_evaluations;
       const int flag = guarded([&] { return value_of(part, t, y_shifted_.data(), n, g); }, thrown_);
       return checked(flag, "value", part) == Status::success;

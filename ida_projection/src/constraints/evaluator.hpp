@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 #include <tether/ida_projection/constraints.hpp>
 #include <tether/ida_projection/projection.hpp>
 #include <tether/ida_projection/statistics.hpp>
+#include <utility>
 #include <vector>
 
 #include "host/guarded.hpp"
@@ -59,10 +61,58 @@ class GuardedRoom {
   std::vector<double> room_;
 };
 
+constexpr int kOverran = std::numeric_limits<int>::min();  ///< flag of a callback that did
+constexpr double kInvolved = 1e-3;  ///< of a kept row in a dropped one, to be named beside it
+/// Tolerances beyond the kept rows: a dropped one that asks for more contradicts them.
+constexpr double kContradicts = 0.5;
+
+/// What rows say where they do not succeed.
+struct RowsReport {
+  std::string text;
+  std::vector<int> rows;  ///< that contradict each other
+  bool fatal = false;     ///< a callback has returned a negative flag or thrown
+
+  /// A callback that did not succeed: its flag, or what it threw. `count`: of rows, for kOverran.
+  Status failed(int flag, const std::string& what, const std::string& thrown, int count) {
+    text = what + (flag == kOverran
+                       ? " writes past its end: Constraints::count is " + std::to_string(count)
+                   : thrown.empty() ? " returned " + std::to_string(flag)
+                                    : " threw: " + thrown);
+    fatal |= flag < 0;
+    return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+  }
+  void contradicting(std::vector<int> found, const Constraints& constraints) {
+    rows = std::move(found);
+    text = "rows contradict each other:";
+    for (const int i : rows) text += " " + std::to_string(i) + " (" + constraints.name(i) + ")";
+  }
+};
+
+/// slope <- d values / de at e = 0, of fourth order: at(e, values) evaluates them four times.
+template <class At>
+Status central_differences(double e, std::vector<double>& slope, std::vector<double>& values,
+                           At at) {
+  std::fill(slope.begin(), slope.end(), 0.0);
+  for (const auto& [steps, weight] :
+       {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
+    const Status status = at(steps * e, values);
+    if (status != Status::success) return status;
+    for (std::size_t i = 0; i < slope.size(); ++i) slope[i] += weight / (12.0 * e) * values[i];
+  }
+  return Status::success;
+}
+
 /// g and C of a set and of everything joined to it, as one system of m rows.
 class Evaluator {
  public:
-  explicit Evaluator(const Constraints& constraints, Statistics& statistics);
+  /// `where`: it reports there; null: in a report of its own.
+  Evaluator(const Constraints& constraints, Statistics& statistics, RowsReport* where = nullptr);
+  Evaluator(const Evaluator&) = delete;
+  Evaluator& operator=(const Evaluator&) = delete;
+
+  /// Which row the last not_finite or failing callback belongs to. Until `fatal` is put back every
+  /// evaluation fails without a call, so that no failed trial point hides it.
+  RowsReport& report;
 
   int rows() const { return rows_; }
   /// So that value() on n unknowns never allocates.
@@ -81,9 +131,6 @@ class Evaluator {
   /// null, or receives g(t, y) as value() does, in one call of the rows that give both.
   Status jacobian(double t, const double* y, int n, const double* scale,
                   const std::vector<int>& columns, double* C, double* value = nullptr);
-  /// The same where C is zero throughout.
-  Status jacobian_into_zeros(double t, const double* y, int n, const double* scale,
-                             const std::vector<int>& columns, double* C, double* value = nullptr);
 
   /// The same with the sparse sets' entries one after the other in `entries`, and the rows of all
   /// other sets one after the other in `full` (n entries each).
@@ -114,14 +161,6 @@ class Evaluator {
   void sensitive(double t, const double* y, int n, const double* scale,
                  const std::function<void(int, int)>& found);
 
-  /// Which row the last not_finite or failing callback belongs to, or what it threw.
-  const std::string& message() const { return message_; }
-
-  /// Whether a callback has returned a negative flag or thrown. Until forget() every evaluation
-  /// then fails without a call, so that no failed trial point hides it.
-  bool fatal() const { return fatal_; }
-  void forget() { fatal_ = false; }
-
  private:
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
@@ -146,16 +185,15 @@ class Evaluator {
   Status all_rows(double t, const double* y, int n, const double* scale,
                   const std::vector<int>& columns, double* g, Place place);
 
+  RowsReport own_;
   const Constraints& constraints_;
   Statistics& statistics_;
   std::vector<Part> parts_;
   GuardedRoom C_room_;
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
-  std::string message_, thrown_;
+  std::string thrown_;
   int rows_ = 0;
   bool uses_differences_ = false, gives_both_ = false, has_sparse_ = false;
-  bool fatal_ = false;
-  bool overrun_ = false;
 };
 
 }  // namespace tether::ida_projection

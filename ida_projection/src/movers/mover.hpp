@@ -2,16 +2,11 @@
 // 8). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
-#include <tether/ida_projection/options.hpp>
-#include <tether/ida_projection/projection.hpp>
-#include <tether/ida_projection/statistics.hpp>
 #include <vector>
 
-#include "constraints/evaluator.hpp"
-#include "host/candidate.hpp"
-#include "movers/curvature.hpp"
 #include "movers/rows_at.hpp"
 
 namespace tether::ida_projection {
@@ -28,43 +23,29 @@ struct Move {
   double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };
 
-/// Judges a sequence of Newton moves: done, converging, or failed. Lengths are in tolerances.
-class Monitor {
+/// Factors of a point `reach` tolerances away leave the part kappa reach of a move. Second moves
+/// measure kappa, and are made only where it could matter. Measurements only increase kappa; a
+/// safety factor of 4 covers that it is measured rarely (method, eq. 8).
+class Curvature {
  public:
-  enum class Verdict { done, go_on, refactor, failed };
-
-  explicit Monitor(const Options& options) : options_(&options) {}
-  void reset() { *this = Monitor(*options_); }
-
-  /// Begins a new candidate.
-  void start() {
-    previous_ = -1.0;
-    moves_ = 0;
-    ++candidates_;
+  /// Whether kappa is to be measured by a second move.
+  bool due(double reach, long candidate) const {
+    return kappa_ < 0.0 || !(reach <= kSafety * measured_) || candidate % kMeasureEvery == 0;
   }
-  /// After a first move of this length: whether judge() would return done for any `floor`, which
-  /// then need not be computed.
-  bool plainly_done(double length) {
-    const bool done = moves_ == 0 && leaves_little(length);
-    if (done) moves_ = 1;
-    return done;
+  /// A second move, after a first one of length `move`, was `left` long.
+  void measured(double reach, double move, double left) {
+    measured_ = std::max(measured_, reach);
+    kappa_ = std::max({kappa_, 0.0, left / (reach * move)});
   }
-  /// After a move of this length; `fresh`: the factors belong to the point that was left;
-  /// `floor`: length below which rounding of y rules.
-  Verdict judge(double length, bool fresh, double floor);
+  /// Length that a move of this length leaves, in tolerances.
+  double left(double reach, double length) const { return kSafety * kappa_ * reach * length; }
 
  private:
-  // Newton's second move has the length kappa d^2, about.
-  bool leaves_little(double length) const {
-    return !curvature_.due(length, candidates_) &&
-           curvature_.left(length, length) <= options_->advanced.tolerance;
-  }
+  static constexpr double kSafety = 4.0;
+  static constexpr long kMeasureEvery = 64;
 
-  const Options* options_;
-  Curvature curvature_;
-  double previous_ = -1.0;
-  int moves_ = 0;
-  long candidates_ = 0;
+  double kappa_ = -1.0;    // for each tolerance of distance; < 0: not measured
+  double measured_ = 0.0;  // longest distance at which it was measured
 };
 
 /// Newton's method onto the constraints, one loop for all storages of their rows. The notation is
@@ -73,13 +54,15 @@ class Monitor {
 class Mover {
  public:
   Mover(const Options& options, std::unique_ptr<RowsAt> rows)
-      : options_(options), monitor_(options), rows_(std::move(rows)) {}
+      : options_(options), rows_(std::move(rows)) {}
 
   RowsAt& rows() { return *rows_; }
-  const RowsAt& rows() const { return *rows_; }
-  const std::string& message() const { return rows_->message; }
+  const std::string& message() const { return rows_->report.text; }
   /// A new run starts.
-  void reset();
+  void reset() {
+    rows_->reset();
+    run_ = Run();
+  }
 
   /// Length of the first Newton move from the candidate; the candidate is not changed.
   Move measure(const Candidate& candidate);
@@ -96,35 +79,29 @@ class Mover {
   }
 
  private:
+  enum class Verdict { done, go_on, refactor, failed };
+  // From a new run on.
+  struct Run {
+    Curvature of_moves, of_settles;
+    long candidates = 0, settles = 0;
+    double length = 0.0;     // of the last first move, in tolerances
+    int nothing_in_row = 0;  // moves that were none
+  };
+
+  bool may_test() const;
   Status factor(double t, bool refill);
   bool clearly_needs_no_move();
-  bool needs_no_move_again(const Candidate& candidate, Move& result);
   void newton(const Candidate& candidate, Move& result);
   bool allowed(const Candidate& candidate, Move& result);
-  bool done(const Candidate& candidate, const Solution& solution, bool fresh, Move& result,
-            Monitor::Verdict& verdict);
-  Status remove_rest(const Candidate& candidate, double reach);
+  bool leaves_little(double length) const;
+  Verdict judge(double length, double previous, const Move& made, bool fresh, double floor);
+  bool done(const Candidate& candidate, const Solution& found, double previous, bool fresh,
+            Move& result, Verdict* verdict);
 
   const Options& options_;
-  Monitor monitor_;
   std::unique_ptr<RowsAt> rows_;
-  double move_length_ = 0.0;  // of the last first move, in tolerances
-  int age_ = 0;               // of the factors, in candidates
-  int tests_ = 0;             // with the factors of an earlier candidate
-  int nothing_in_row_ = 0;    // moves that were none
-  bool still_ = false;        // the last candidate needed no move
-  Curvature curvature_;       // for what a polish moves
-  long settles_ = 0;
+  int age_ = 0;  // of the factors, in candidates that were tested with them
+  Run run_;
 };
-
-/// The storage that suits the rows. The options and statistics outlive it. Drift is that of the
-/// first `reported` rows (-1: of all).
-std::unique_ptr<RowsAt> make_rows(const Constraints&, const Options&, Statistics&, N_Vector like,
-                                  int reported = -1);
-/// The storages of rows on contiguous vectors of `size` unknowns, and of the caller's projection.
-std::unique_ptr<RowsAt> make_contiguous_rows(const Constraints&, const Options&, Statistics&,
-                                             int size, bool sparse, int reported = -1);
-std::unique_ptr<RowsAt> make_user_rows(const Constraints&, const Options&, Statistics&,
-                                       N_Vector like);
 
 }  // namespace tether::ida_projection

@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <string>
 #include <sundials/sundials_nvector.h>
+#include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/projection.hpp>
+#include <tether/ida_projection/statistics.hpp>
 #include <vector>
 
+#include "constraints/evaluator.hpp"
 #include "host/candidate.hpp"
 
 namespace tether::ida_projection {
@@ -31,20 +35,28 @@ struct Solution {
 enum class Solve {
   first,  ///< the factors are new: which of the rows are to be trusted is decided
   again,  ///< the same rows as before
-  rest,   ///< what a move or a polish has left
-  test,   ///< no move follows
+  rest,   ///< the same for what a polish has left, too little to show which rows are independent
+  test,   ///< the same, and no move follows
   point   ///< a point far away is looked for: all unknowns count
 };
 
-/// g, C and its factors for the candidate that was loaded last. Newton's loop calls load(),
-/// value(), factor(), solve(), apply() and the functions about rounding. The other functions tell
-/// what the storage can do.
+/// g, C and its factors for the candidate that was loaded last. Newton's loop is about six of these
+/// functions, and the data that they leave.
 class RowsAt {
  public:
-  virtual ~RowsAt() = default;
+  /// How the rows are given. A projection of the caller's own has no g and is one solution.
+  enum class Kind { entries, vectors, projection };
+  enum class Factors { none, of_some_rows, of_all_rows };
 
-  /// Whether there is a g. A projection of the caller's own has none and consists of one solution.
-  virtual bool gives_g() const { return true; }
+  explicit RowsAt(Kind of_rows) : kind(of_rows) {}
+  virtual ~RowsAt() = default;
+  RowsAt(const RowsAt&) = delete;
+  RowsAt& operator=(const RowsAt&) = delete;
+
+  const Kind kind;
+  RowsReport report;
+  double drift = 0.0;  ///< largest |g_i| as evaluated last
+  Factors factors = Factors::none;
 
   /// Loads y = base + correction. `refills`: factor() in the metric of this candidate follows; else
   /// only its scale is updated.
@@ -56,58 +68,65 @@ class RowsAt {
   virtual Solution solve(Solve how) = 0;
   /// y and the correction move by -share dy.
   virtual Status apply(double share, const Candidate& candidate) = 0;
-  /// WRMS of y and of the corrector's change, in tolerances.
-  virtual double size() const = 0;
-  virtual double change() const = 0;
-  /// Does the rounding of its own terms explain every g_i? The length of a move that it explains.
-  virtual bool rounding_only() { return false; }
-  virtual double rounding_length() { return 0.0; }
+  /// Whether rounding explains a move of this length, by the factors; of any length: every g_i, by
+  /// its own terms.
+  virtual bool is_rounding(double move = std::numeric_limits<double>::infinity()) = 0;
 
-  /// Moves y with a changed correction. Returns the length of `change` over the variables of the
-  /// error test, in tolerances.
-  virtual double shift(N_Vector change) = 0;
-  /// Computes y anew from the present correction.
-  virtual void restart(const Candidate& candidate) = 0;
-  /// Largest |g_i| as evaluated last.
-  virtual double drift() const = 0;
-
-  /// Whether there are factors, and they may be used to see that no move is needed.
-  virtual bool may_test_with_factors() const = 0;
-  /// Whether the independent rows were determined for this candidate.
-  virtual bool decided() const { return true; }
-  virtual void forget_rank() {}
-  /// Whether dropped rows contradict the kept ones; sets `message` and `contradicting`.
-  virtual bool contradicts() = 0;
+  /// y follows the correction, which has changed by `change` (null: by anything). Returns the
+  /// length of the change over the variables of the error test, in tolerances.
+  virtual double follow(const Candidate& candidate, N_Vector change) = 0;
+  /// WRMS of the corrector's change over these variables, in tolerances.
+  virtual double corrected() const = 0;
+  /// Whether dropped rows contradict the kept ones; reported then.
+  virtual bool contradicts() { return false; }
   /// Moves failed or were many: perhaps entries of C are missing that g could not fill before.
   virtual void refresh_pattern_soon() {}
 
   /// Which components are algebraic (1 differential, 0 algebraic; null: none), at a candidate.
-  virtual Status set_algebraic(const Candidate& candidate, N_Vector id) = 0;
+  virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
+    return Status::success;
+  }
   /// D as the last candidate had it, of every component; false: there is none.
   virtual bool metric(N_Vector /*D*/) const { return false; }
   /// The attempt that used the last candidate was accepted: its scale is kept.
   virtual void accept() {}
-  virtual void reset() = 0;
+  virtual void reset() {}
   /// From the next move on: one scale for all unknowns of a level (row_levels.hpp), or a scale for
   /// each unknown. Returns false if there are too few rows or levels.
   virtual bool use_levels(bool) { return false; }
   virtual bool may_use_levels() const { return false; }
-
   /// C y' row by row with C as it was evaluated last. False: not known.
   virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {
     return false;
   }
 
-  /// Moves y' onto C y' + g_t = 0, nearest in the metric, with g_t by central differences. Returns
-  /// false if it was not found.
-  virtual bool tangent(double /*t*/, N_Vector /*yp*/) { return false; }
-
-  /// Whether a callback has returned a fatal flag since forget_failure().
-  virtual bool fatal() const = 0;
-  virtual void forget_failure() = 0;
-
-  std::string message;             ///< of what failed
-  std::vector<int> contradicting;  ///< rows
+  /// For moves on the tangent of the constraints, which leave rounding only: C at y, with the
+  /// reciprocal tolerances of y. Rows that are dependent on the set have dependent derivatives
+  /// there, up to an error as large as the distance from the set: thin rows take no part.
+  virtual Status linearise(double /*t*/, N_Vector /*y*/, N_Vector /*weights*/, N_Vector /*id*/) {
+    return Status::misused;
+  }
+  /// Its factors in the metric D, one entry for each component.
+  virtual Status factor_in(N_Vector /*D*/) { return Status::misused; }
+  /// r = C s, with the accuracy that g allows, whatever C is good for.
+  virtual Status product(N_Vector /*s*/, std::vector<double>& /*r*/) { return Status::misused; }
+  /// The shortest ds with C ds = r.
+  virtual void solve_for(const std::vector<double>& /*r*/, N_Vector /*ds*/) {}
+  /// g at any point, for differences; its size is the number of rows.
+  virtual Status value_at(double /*t*/, N_Vector /*y*/, std::vector<double>& /*g*/) {
+    return Status::misused;
+  }
+  virtual int count() const { return 0; }
 };
+
+/// The storage that suits the rows. The options and statistics outlive it. Drift is that of the
+/// first `reported` rows (-1: of all).
+std::unique_ptr<RowsAt> make_rows(const Constraints&, const Options&, Statistics&, N_Vector like,
+                                  int reported = -1);
+/// The storages of rows on contiguous vectors of `size` unknowns, and of the caller's projection.
+std::unique_ptr<RowsAt> make_contiguous_rows(const Constraints&, const Options&, Statistics&,
+                                             int size, bool sparse, int reported = -1);
+std::unique_ptr<RowsAt> make_user_rows(const Constraints&, const Options&, Statistics&,
+                                       N_Vector like);
 
 }  // namespace tether::ida_projection

@@ -1,6 +1,6 @@
 // Tether: a projection that the caller does himself. SPDX-License-Identifier: BSD-3-Clause
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 
 namespace tether::ida_projection {
 
@@ -10,14 +10,14 @@ class UserRows final : public RowsAt {
  public:
   UserRows(const Constraints& constraints, const Options& options, Statistics& statistics,
            N_Vector like)
-      : user_(std::get<UserProjection>(constraints.jacobian)),
+      : RowsAt(Kind::projection),
+        user_(std::get<UserProjection>(constraints.jacobian)),
         options_(options),
         statistics_(statistics),
         y_(like),
         change_(like),
         error_(like) {}
 
-  bool gives_g() const override { return false; }
   Status load(const Candidate& candidate, bool) override {
     at_ = candidate;
     return Status::success;
@@ -28,17 +28,10 @@ class UserRows final : public RowsAt {
     N_VConst(0.0, change_);
     ++statistics_.value_evaluations;
     std::string thrown;
+    const double tolerance = options_.advanced.tolerance;
     const int flag = guarded(
-        [&] {
-          return user_.function(t, y_, change_, options_.advanced.tolerance, error_,
-                                user_.user_data);
-        },
-        thrown);
-    if (flag == 0) return Status::success;
-    message = thrown.empty() ? "the user's projection returned " + std::to_string(flag)
-                             : "the user's projection threw: " + thrown;
-    if (flag < 0) fatal_ = true;
-    return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
+        [&] { return user_.function(t, y_, change_, tolerance, error_, user_.user_data); }, thrown);
+    return flag == 0 ? Status::success : report.failed(flag, "the user's projection", thrown, 0);
   }
   Status factor(double, bool) override { return Status::success; }
   Solution solve(Solve) override {
@@ -51,17 +44,11 @@ class UserRows final : public RowsAt {
     N_VLinearSum(1.0, candidate.correction, share, change_, candidate.correction);
     return Status::success;
   }
-  double size() const override { return 0.0; }
-  double change() const override { return N_VWrmsNorm(at_.correction, at_.weights); }
-  double shift(N_Vector change) override { return N_VWrmsNorm(change, at_.weights); }
-  void restart(const Candidate&) override {}
-  double drift() const override { return 0.0; }
-  bool may_test_with_factors() const override { return false; }
-  bool contradicts() override { return false; }
-  Status set_algebraic(const Candidate&, N_Vector) override { return Status::success; }
-  void reset() override {}
-  bool fatal() const override { return fatal_; }
-  void forget_failure() override { fatal_ = false; }
+  bool is_rounding(double) override { return false; }
+  double follow(const Candidate&, N_Vector change) override {
+    return change != nullptr ? N_VWrmsNorm(change, at_.weights) : 0.0;
+  }
+  double corrected() const override { return N_VWrmsNorm(at_.correction, at_.weights); }
 
  private:
   UserProjection user_;
@@ -69,7 +56,6 @@ class UserRows final : public RowsAt {
   Statistics& statistics_;
   Candidate at_{};
   OwnedVector y_, change_, error_;
-  bool fatal_ = false;
 };
 
 }  // namespace

@@ -1,11 +1,13 @@
 // Tether: few rows given by their gradients, on any N_Vector. SPDX-License-Identifier: BSD-3-Clause
 #include "rows/gradient_rows.hpp"
-#include "host/rounding.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <tether/linalg/index.hpp>
+
+#include "constraints/evaluator.hpp"
+#include "host/rounding.hpp"
 
 namespace tether::ida_projection {
 
@@ -13,7 +15,6 @@ namespace {
 
 constexpr double kTiny = std::numeric_limits<double>::min();
 constexpr double kDependent = 1e-12;      // of a unit row, for each row
-constexpr double kInvolved = 1e-3;        // share of a kept row in a dropped one
 constexpr double kReorthogonalise = 0.1;  // of a unit row: where less is left, digits are lost
 
 using linalg::at;
@@ -112,7 +113,8 @@ std::vector<int> GradientRows::contradicting() const {
     const int row = pivot_[at(k)];
     const double size = norm_[at(row)];
     const double left = z_[at(k)] * (size > kTiny ? size : 1.0);
-    if (left <= 0.5 * std::sqrt(length_) * tolerance_norm_[at(row)] + 1e2 * kEpsilon * size)
+    if (left <=
+        kContradicts * std::sqrt(length_) * tolerance_norm_[at(row)] + 1e2 * kEpsilon * size)
       continue;
     std::vector<int> found = {row};
     for (int i = 0; i < rank_; ++i)

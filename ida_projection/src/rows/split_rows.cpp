@@ -4,12 +4,88 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <numeric>
 #include <tether/linalg/index.hpp>
 #include <utility>
+
+#include "host/rounding.hpp"
+#include "host/shortest.hpp"
 
 namespace tether::ida_projection {
 
 using linalg::at;
+
+namespace {
+
+constexpr long kFirstRefresh = 16;  // evaluations of C, then twice as many each time
+
+// Whether a row is solved for differential variables although it contains algebraic ones. This is
+// so if the algebraic part (in tolerances, squared) is negligible beside the rest: solving for it
+// would divide by nearly zero. `already`: it was so before.
+bool loses_algebraic_part(double algebraic, double differential, bool already) {
+  constexpr double kLost = 1e-3, kBack = 1e-2;
+  const double share = already ? kBack : kLost;
+  return algebraic <= share * share * differential;
+}
+
+// The dropped row, k in pivot order, that asks for most beyond the kept ones, in tolerances. Up to
+// what a move of the size of a tolerance explains it must follow from them.
+struct LeftOfDropped {
+  double tolerances = 0.0;
+  int k = -1;
+};
+
+bool vanishes(double norm) { return !(norm > std::numeric_limits<double>::min()); }
+
+LeftOfDropped most_left_of_dropped(const Block& block, const StoredRows& C,
+                                   const std::vector<double>& WT) {
+  return block.solver([&](const auto& solver) {
+    LeftOfDropped most;
+    for (int k = solver.rank(); k < static_cast<int>(block.rows.size()); ++k) {
+      const double norm = solver.row_norm(solver.pivot(k));
+      const double inconsistency =
+          std::max(0.0, solver.inconsistency(k) - (vanishes(norm) ? 0.0 : 1e2 * kEpsilon));
+      if (inconsistency == 0.0) continue;
+      double sum = 0.0;  // |row(C WT)|^2
+      C.visit(block.rows[at(solver.pivot(k))], [&](int j, double c) {
+        if (block.contains(j)) sum += c * WT[at(j)] * (c * WT[at(j)]);
+      });
+      // A row that vanishes has no distance: so much of its g is tolerated.
+      const double weight = vanishes(norm) ? kContradicts * 1e12
+                                           : norm / std::max(std::sqrt(sum), 1e-300) /
+                                                 std::sqrt(static_cast<double>(WT.size()));
+      const double left = inconsistency * weight;
+      if (left > most.tolerances) most = {left, k};
+    }
+    return most;
+  });
+}
+
+// The rows that this one contradicts, for the caller.
+void report_contradiction(const Block& block, const LeftOfDropped& left,
+                          const Constraints& constraints, RowsReport& report) {
+  block.solver([&](const auto& solver) {
+    const int row = block.rows[at(solver.pivot(left.k))];
+    if (vanishes(solver.row_norm(solver.pivot(left.k)))) {
+      report.rows = {row};
+      report.text = constraints.name(row) +
+                    ": the gradient vanishes although g = " + brief(solver.inconsistency(left.k));
+      return;
+    }
+    const std::vector<double> share = solver.dependence(left.k);
+    std::vector<int> found = {row};
+    for (int i = 0; i < solver.rank(); ++i)
+      if (std::abs(share[at(i)]) > kInvolved) found.push_back(block.rows[at(solver.pivot(i))]);
+    std::sort(found.begin(), found.end());
+    report.contradicting(std::move(found), constraints);
+    report.text += "; a distance of " + brief(left.tolerances) + " tolerances stays unsolved";
+  });
+}
+
+}  // namespace
 
 std::vector<double> some_tolerances_away(std::vector<double> y, const std::vector<double>& WT) {
   for (std::size_t i = 0; i < y.size(); ++i)
@@ -18,63 +94,181 @@ std::vector<double> some_tolerances_away(std::vector<double> y, const std::vecto
   return y;
 }
 
+StoredRows::StoredRows(const Evaluator& evaluator, int n, bool sparse) : n_(n), sparse_(sparse) {
+  for (const Evaluator::Part& part : evaluator.parts())
+    if (sparse && part.sparse != nullptr)
+      columns_.insert(columns_.end(), part.sparse->columns.begin(), part.sparse->columns.end());
+  int entry = 0, first_full = static_cast<int>(columns_.size());
+  for (const Evaluator::Part& part : evaluator.parts())
+    for (int i = 0; i < part.set->count; ++i) {
+      const bool full = !sparse || part.sparse == nullptr;
+      const int count = full ? n : part.sparse->starts[at(i + 1)] - part.sparse->starts[at(i)];
+      int& begin = full ? first_full : entry;
+      rows_.push_back({begin, count, full});
+      begin += count;
+    }
+  values_.assign(at(first_full), 0.0);
+  seen_.assign(values_.size(), 0);
+}
+
+Status StoredRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                            const std::vector<int>& columns, double* g) {
+  if (sparse_)
+    return evaluator.entries(t, y, n_, WT, columns, values_.data(),
+                             values_.data() + columns_.size(), g);
+  return evaluator.jacobian(t, y, n_, WT, columns, values_.data(), g);
+}
+
+void StoredRows::notice_all() {
+  for (std::size_t e = 0; e < seen_.size(); ++e) seen_[e] |= values_[e] != 0.0;
+}
+
+// Checks all entries without a branch for each, since hardly ever one has changed.
+bool StoredRows::notice(const std::vector<std::size_t>& entries) {
+  std::uint64_t bits = 0;
+  for (const std::size_t e : entries) {
+    std::uint64_t entry;
+    std::memcpy(&entry, &values_[e], sizeof entry);
+    bits |= (entry << 1) | static_cast<std::uint64_t>(seen_[e]);  // but for the sign
+  }
+  if (bits == 0) return false;
+  for (const std::size_t e : entries) seen_[e] |= values_[e] != 0.0;
+  return true;
+}
+
+RowPattern StoredRows::pattern(const std::vector<int>& of_rows) const {
+  RowPattern rows;
+  rows.n = n_;
+  for (const int i : of_rows) {
+    visit_places(i, [&rows](int j, std::size_t, bool seen) {
+      if (seen) rows.columns.push_back(j);
+    });
+    rows.starts.push_back(static_cast<int>(rows.columns.size()));
+  }
+  return rows;
+}
+
+double StoredRows::terms(int i, const double* y) const {
+  double sum = 0.0;
+  visit(i, [&](int j, double c) { sum += std::abs(c * y[j]); });
+  return sum;
+}
+
+double StoredRows::times(int i, const double* y) const {
+  double sum = 0.0;
+  visit(i, [&](int j, double c) { sum += c * y[j]; });
+  return sum;
+}
+
+bool Block::contains(int j) const {
+  if (first >= 0) return j >= first && j < first + static_cast<int>(columns.size());
+  return std::binary_search(columns.begin(), columns.end(), j);
+}
+
+void Block::set_up(const StoredRows& C, int n) {
+  const auto count = static_cast<int>(columns.size());
+  if (!C.sparse()) {
+    dense.resize(static_cast<int>(rows.size()), count);
+  } else {
+    std::vector<int> local(at(n), -1), starts{0}, entries;
+    for (int k = 0; k < count; ++k) local[at(columns[at(k)])] = k;
+    gather.clear();
+    int full = 0;
+    for (const int i : rows) {
+      if (C.full(i)) {
+        ++full;
+        continue;
+      }
+      C.visit_places(i, [&](int j, std::size_t e, bool) {
+        if (local[at(j)] < 0) return;
+        entries.push_back(local[at(j)]);
+        gather.push_back(static_cast<int>(e));
+      });
+      starts.push_back(static_cast<int>(entries.size()));
+    }
+    if (!sparse) sparse = std::make_unique<linalg::SparseMinimumNorm>();
+    sparse->resize(count, std::move(starts), std::move(entries), full);
+  }
+  g.assign(rows.size(), 0.0);
+  dy.assign(columns.size(), 0.0);
+  const bool adjacent = !columns.empty() && columns.back() - columns.front() + 1 == count;
+  first = adjacent ? columns.front() : -1;
+}
+
+bool Block::factor(const StoredRows& C, int n, double rank_tolerance) {
+  if (!sparse)
+    return dense.factor(C.values().data(), n, rows.data(), columns.data(), rank_tolerance);
+  double* to = sparse->entries();
+  for (std::size_t k = 0; k < gather.size(); ++k) to[k] = C.values()[at(gather[k])];
+  for (int k = sparse->sparse_rows(); k < sparse->rows(); ++k)
+    for_columns([from = C.entries(rows[at(k)]), row = sparse->full_row(k - sparse->sparse_rows())](
+                    int c, int j) { row[c] = from[j]; });
+  if (!sparse->factor(rank_tolerance)) return false;
+  least_independent = 1.0;
+  for (int i = 0; i < sparse->rows(); ++i)
+    least_independent = std::min(least_independent, sparse->independent_part(i));
+  return true;
+}
+
+void Block::solve() {
+  if (sparse)
+    sparse->solve(g.data(), dy.data(),
+                  std::max(linalg::SparseMinimumNorm::kSolved * least_independent,
+                           linalg::SparseMinimumNorm::kTolerance));
+  else
+    dense.solve(g.data(), dy.data());
+}
+
 // The rank tolerance of sparse rows is the sine of the angle at which a row counts as dependent:
 // its square is what A A^T tells from zero.
-template <class Solver>
-SplitRows<Solver>::SplitRows(const Constraints& constraints, const Evaluator& evaluator, int n)
+SplitRows::SplitRows(const Constraints& constraints, Evaluator& evaluator, int n, bool sparse)
     : constraints_(constraints),
+      evaluator_(evaluator),
       m_(evaluator.rows()),
       n_(n),
-      rank_tolerance_(!kDense || evaluator.uses_differences() ? 1e-6 : std::max(m_, n) * 1e-13),
-      C_(evaluator, n, !kDense) {}
+      rank_tolerance_(sparse || evaluator.uses_differences() ? 1e-6 : std::max(m_, n) * 1e-13),
+      C_(evaluator, n, sparse),
+      next_refresh_(kFirstRefresh) {}
 
-// Entries not zero at y or at a point some tolerances away.
-template <class Solver>
-Status SplitRows<Solver>::find_seen(Evaluator& evaluator, double t, const std::vector<double>& y0,
-                                    const std::vector<double>& WT) {
+// Entries not zero at y or at a point some tolerances away. Columns that differences do not visit
+// leave no entry in C.
+Status SplitRows::find_seen(double t, const std::vector<double>& y, const std::vector<double>& WT) {
   C_.forget_seen();
   columns_.resize(at(n_));
-  for (int j = 0; j < n_; ++j) columns_[at(j)] = j;
-  std::vector<double> y = y0;
-  for (int pass = 0; pass < 2; ++pass) {
-    if (pass == 1) y = some_tolerances_away(std::move(y), WT);
-    Status status = C_.evaluate(evaluator, t, y.data(), WT.data(), columns_, nullptr);
-    const bool evaluated = status == Status::success;
-    if (evaluated && !all_finite(C_.values().data(), C_.values().size()))
+  std::iota(columns_.begin(), columns_.end(), 0);
+  for (const bool away : {false, true}) {
+    const std::vector<double> point = away ? some_tolerances_away(y, WT) : y;
+    Status status = C_.evaluate(evaluator_, t, point.data(), WT.data(), columns_, nullptr);
+    if (status == Status::success && !all_finite(C_.values().data(), C_.values().size())) {
       status = Status::not_finite;
-    if (status != Status::success && pass == 0) {
-      message = evaluated ? "the constraint Jacobian C has an entry that is not finite"
-                          : evaluator.message();
-      return status;
+      if (!away)
+        evaluator_.report.text = "the constraint Jacobian C has an entry that is not finite";
     }
-    if (status == Status::success) C_.notice_all();
+    if (status == Status::success)
+      C_.notice_all();
+    else if (!away)
+      return status;
   }
-  if (evaluator.uses_differences()) extend_pattern(evaluator, t, y0.data(), WT.data());
+  if (evaluator_.uses_differences())
+    evaluator_.sensitive(t, y.data(), n_, WT.data(), [this](int i, int j) { C_.notice(i, j); });
   return Status::success;
 }
 
-// Columns that differences do not visit leave no entry in C.
-template <class Solver>
-void SplitRows<Solver>::extend_pattern(Evaluator& evaluator, double t, const double* y,
-                                       const double* WT) {
-  evaluator.sensitive(t, y, n_, WT, [this](int i, int j) { C_.notice(i, j); });
-}
-
-template <class Solver>
-Status SplitRows<Solver>::structure(Evaluator& evaluator, double t, const std::vector<double>& y,
-                                    const std::vector<double>& WT, const std::vector<bool>& hold,
-                                    const double* id) {
+Status SplitRows::structure(double t, const std::vector<double>& y, const std::vector<double>& WT,
+                            const std::vector<bool>& hold, const double* id) {
   structured_ = false;
-  const Status status = find_seen(evaluator, t, y, WT);
+  const Status status = find_seen(t, y, WT);
   if (status != Status::success) return status;
-  kinds_.begin(n_, m_, hold, id);
+  hold_ = hold;
+  id_.assign(id, id != nullptr ? id + n_ : id);
+  without_.assign(at(m_), 0);
   for (int i = 0; i < m_; ++i) {
-    bool held = false, free = false;
+    bool moved = false, stays = false;
     C_.visit_places(i, [&](int j, std::size_t, bool seen) {
-      if (seen || !C_.full(i)) (kinds_.held[at(j)] ? held : free) = true;
+      if (seen || !C_.full(i)) (held(j) ? stays : moved) = true;
     });
-    if (free || (!held && C_.full(i))) continue;
-    message = constraints_.name(i) + " depends on no component that is free to move";
+    if (moved || (!stays && C_.full(i))) continue;
+    evaluator_.report.text = constraints_.name(i) + " depends on no component that is free to move";
     return Status::inconsistent;
   }
   rearrange();
@@ -82,36 +276,33 @@ Status SplitRows<Solver>::structure(Evaluator& evaluator, double t, const std::v
   return Status::success;
 }
 
-template <class Solver>
-void SplitRows<Solver>::rearrange() {
+void SplitRows::rearrange() {
   outgrown_ = false;
   split();
-  set_up(d, &gather_d_);
-  set_up(a, &gather_a_);
+  d.set_up(C_, n_);
+  a.set_up(C_, n_);
   moved_.assign(a.rows.empty() ? 0 : at(n_), 0.0);
   watch();
 }
 
-template <class Solver>
-void SplitRows<Solver>::split() {
+void SplitRows::split() {
   std::vector<char> used(at(n_), 0), algebraic_row(at(m_), 0);
   for (int i = 0; i < m_; ++i) {
     bool empty = C_.full(i);
     C_.visit_places(i, [&](int j, std::size_t, bool seen) {
-      if (kinds_.held[at(j)] || (!seen && C_.full(i))) return;
+      if (held(j) || (!seen && C_.full(i))) return;
       empty = false;
       // An algebraic entry of the pattern counts only if it differs from zero at one of the points.
-      used[at(j)] |= seen || !kinds_.algebraic(j);
-      algebraic_row[at(i)] |= seen && kinds_.algebraic(j) && !kinds_.without[at(i)];
+      used[at(j)] |= seen || !algebraic(j);
+      algebraic_row[at(i)] |= seen && algebraic(j) && !without_[at(i)];
     });
     // A row that vanishes at these points may depend on any variable.
-    for (int j = 0; empty && j < n_; ++j)
-      used[at(j)] |= !kinds_.held[at(j)] && !kinds_.algebraic(j);
+    for (int j = 0; empty && j < n_; ++j) used[at(j)] |= !held(j) && !algebraic(j);
   }
   // More rows than algebraic columns to satisfy them with: all rows over all columns together.
   const auto algebraic_rows = std::count(algebraic_row.begin(), algebraic_row.end(), 1);
   std::ptrdiff_t algebraic_columns = 0;
-  for (int j = 0; j < n_; ++j) algebraic_columns += used[at(j)] && kinds_.algebraic(j) ? 1 : 0;
+  for (int j = 0; j < n_; ++j) algebraic_columns += used[at(j)] && algebraic(j) ? 1 : 0;
   const bool together = algebraic_rows > algebraic_columns;
   for (Block* block : {&d, &a}) {
     block->rows.clear();
@@ -123,204 +314,108 @@ void SplitRows<Solver>::split() {
   columns_.clear();
   for (int j = 0; j < n_; ++j) {
     if (!used[at(j)]) continue;
-    (kinds_.algebraic(j) && !together ? a : d).columns.push_back(j);
+    (algebraic(j) && !together ? a : d).columns.push_back(j);
     columns_.push_back(j);
   }
 }
 
-template <class Solver>
-void SplitRows<Solver>::set_up(Block& block, std::vector<int>* gather) {
-  if constexpr (kDense) {
-    block.solver.resize(static_cast<int>(block.rows.size()),
-                        static_cast<int>(block.columns.size()));
-  } else {
-    std::vector<int> local(at(n_), -1), starts{0}, columns;
-    for (std::size_t k = 0; k < block.columns.size(); ++k)
-      local[at(block.columns[k])] = static_cast<int>(k);
-    gather->clear();
-    int full = 0;
-    for (const int i : block.rows) {
-      if (C_.full(i)) {
-        ++full;
-        continue;
-      }
-      C_.visit_places(i, [&](int j, std::size_t e, bool) {
-        if (local[at(j)] < 0) return;
-        columns.push_back(local[at(j)]);
-        gather->push_back(static_cast<int>(e));
-      });
-      starts.push_back(static_cast<int>(columns.size()));
-    }
-    block.solver.resize(static_cast<int>(block.columns.size()), std::move(starts),
-                        std::move(columns), full);
-  }
-  block.resize();
-}
-
-// Entries that are zero so far and would bring a new column, or an algebraic one into a row that
-// has none.
-template <class Solver>
-void SplitRows<Solver>::watch() {
+// Finds entries that are zero so far and would bring a new column, or an algebraic one into a row
+// that has none.
+void SplitRows::watch() {
   watched_.clear();
-  kinds_.mixed.clear();
+  mixed_.clear();
   std::vector<char> used(at(n_), 0), whole(at(m_), 0);
   for (int j : columns_) used[at(j)] = 1;
   const bool split = !a.rows.empty() || std::none_of(d.columns.begin(), d.columns.end(),
-                                                     [this](int j) { return kinds_.algebraic(j); });
+                                                     [this](int j) { return algebraic(j); });
   for (int i : d.rows) whole[at(i)] = split;
   for (int i = 0; i < m_; ++i) {
     bool mixed = false;
     C_.visit_places(i, [&](int j, std::size_t e, bool seen) {
-      if (kinds_.held[at(j)]) return;
-      mixed = mixed || (seen && kinds_.algebraic(j));
-      if (!seen && (!used[at(j)] || (whole[at(i)] != 0 && kinds_.algebraic(j))))
-        watched_.push_back(e);
+      if (held(j)) return;
+      mixed = mixed || (seen && algebraic(j));
+      if (!seen && (!used[at(j)] || (whole[at(i)] != 0 && algebraic(j)))) watched_.push_back(e);
     });
-    if (mixed && split) kinds_.mixed.push_back(i);
+    if (mixed && split) mixed_.push_back(i);
   }
 }
 
-template <class Solver>
-Status SplitRows<Solver>::evaluate(Evaluator& evaluator, double t, const double* y,
-                                   const double* WT, double* g) {
-  const Status status = C_.evaluate(evaluator, t, y, WT, columns_, g);
+Status SplitRows::evaluate_once(double t, const double* y, const double* WT, double* g) {
+  const Status status = C_.evaluate(evaluator_, t, y, WT, columns_, g);
   if (status != Status::success || !structured_) return status;
-  outgrown_ |= kinds_.changed([&](int i, double* squares) {
+  for (const int i : mixed_) {
+    double squares[2] = {0.0, 0.0};  // of the differential and the algebraic part, in tolerances
     C_.visit(i, [&](int j, double c) {
-      if (kinds_.held[at(j)]) return;
-      const double entry = c * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
-      squares[kinds_.algebraic(j) ? 0 : 1] += entry * entry;
+      const double entry = held(j) ? 0.0 : c * (WT != nullptr && WT[j] > 0.0 ? WT[j] : 1.0);
+      squares[algebraic(j) ? 1 : 0] += entry * entry;
     });
-  });
+    char& without = without_[at(i)];
+    const bool lost = loses_algebraic_part(squares[1], squares[0], without != 0);
+    outgrown_ |= lost != (without != 0);
+    without = lost ? 1 : 0;
+  }
   if (watched_.empty()) return status;
-  if (evaluator.uses_differences() && refresh_.due()) extend_pattern(evaluator, t, y, WT);
+  if (evaluator_.uses_differences() && ++evaluations_ >= next_refresh_) {
+    next_refresh_ = std::max(kFirstRefresh, 2 * evaluations_);
+    evaluator_.sensitive(t, y, n_, WT, [this](int i, int j) { C_.notice(i, j); });
+  }
   outgrown_ |= C_.notice(watched_);
   return status;
 }
 
-template <class Solver>
-Status SplitRows<Solver>::learn_trust(Evaluator& evaluator, double t, const double* y,
-                                      const double* WT, double length) {
-  if constexpr (kDense) {
-    if (!trust.wants_to_learn(length)) return Status::success;
-    C_after_.resize(C_.values().size());
-    const Status status = evaluator.jacobian(t, y, n_, WT, columns_, C_after_.data());
-    Block& block = counted();
-    if (status == Status::success)
-      trust.learn(block.solver, block.rows, block.columns, n_, C_.values(), C_after_, length);
-    return status;
-  }
-  return Status::success;
+Status SplitRows::learn_trust(double t, const double* y, const double* WT, double length) {
+  if (C_.sparse() || !trust.wants_to_learn(length)) return Status::success;
+  C_after_.resize(C_.values().size());
+  const Status status = evaluator_.jacobian(t, y, n_, WT, columns_, C_after_.data());
+  Block& block = counted();
+  if (status == Status::success)
+    trust.learn(block.dense, block.rows, block.columns, n_, C_.values(), C_after_, length);
+  return status;
 }
 
-template <class Solver>
-bool SplitRows<Solver>::factor(Block& block, const std::vector<int>& gather) {
-  if (block.rows.empty()) return true;
-  if constexpr (kDense)
-    return block.solver.factor(C_.values().data(), n_, block.rows.data(), block.columns.data(),
-                               rank_tolerance_);
-  else {
-    double* to = block.solver.entries();
-    for (std::size_t k = 0; k < gather.size(); ++k) to[k] = C_.values()[at(gather[k])];
-    const int sparse = block.solver.sparse_rows();
-    for (int k = sparse; k < block.solver.rows(); ++k) {
-      const double* from = C_.entries(block.rows[at(k)]);
-      double* row = block.solver.full_row(k - sparse);
-      block.for_columns([=](int c, int j) { row[c] = from[j]; });
-    }
-    if (!block.solver.factor(rank_tolerance_)) return false;
-    block.least_independent = 1.0;
-    for (int i = 0; i < block.solver.rows(); ++i)
-      block.least_independent = std::min(block.least_independent, block.solver.independent_part(i));
-    return true;
-  }
+bool SplitRows::factor() {
+  return (d.rows.empty() || d.factor(C_, n_, rank_tolerance_)) &&
+         (a.rows.empty() || a.factor(C_, n_, rank_tolerance_));
 }
 
-template <class Solver>
-bool SplitRows<Solver>::factor() {
-  return factor(d, gather_d_) && factor(a, gather_a_);
+bool SplitRows::factor_kept() {
+  const auto kept = [this](Block& block) {
+    return block.rows.empty() ||
+           block.dense.factor_kept(C_.values().data(), n_, block.rows.data(), block.columns.data());
+  };
+  return !C_.sparse() && kept(d) && kept(a);
 }
 
-template <class Solver>
-bool SplitRows<Solver>::factor_kept() {
-  if constexpr (kDense) {
-    for (Block* block : {&d, &a})
-      if (!block->rows.empty() &&
-          !block->solver.factor_kept(C_.values().data(), n_, block->rows.data(),
-                                     block->columns.data()))
-        return false;
-    return true;
-  }
-  return false;
-}
-
-template <class Solver>
-void SplitRows<Solver>::solve_block(Block& block) {
-  if constexpr (kDense)
-    block.solver.solve(block.g.data(), block.dy.data());
-  else
-    block.solver.solve(
-        block.g.data(), block.dy.data(),
-        std::max(kSolved * block.least_independent, linalg::SparseMinimumNorm::kTolerance));
-}
-
-template <class Solver>
-void SplitRows<Solver>::solve(const std::vector<double>& g) {
-  if constexpr (kDense) {
-    if (a.rows.empty()) return d.solver.solve(g.data(), d.dy.data());  // d has every row, in order
-  }
+void SplitRows::solve(const std::vector<double>& g) {
+  if (a.rows.empty() && !d.sparse)
+    return d.dense.solve(g.data(), d.dy.data());  // d has every row, in order
   for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
-  solve_block(d);
+  d.solve();
   if (a.rows.empty()) return;
   d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
   for (std::size_t k = 0; k < a.rows.size(); ++k)
-    a.g[k] = g[at(a.rows[k])] - times(a.rows[k], moved_.data());
-  solve_block(a);
+    a.g[k] = g[at(a.rows[k])] - C_.times(a.rows[k], moved_.data());
+  a.solve();
 }
 
-template <class Solver>
-double SplitRows<Solver>::terms(int i, const double* y) const {
-  double sum = 0.0;
-  C_.visit(i, [&](int j, double c) { sum += std::abs(c * y[j]); });
-  return sum;
+bool SplitRows::drops_rows() const {
+  const auto drops = [](const auto& solver) { return solver.dropped() > 0; };
+  return d.solver(drops) || a.solver(drops);
 }
 
-template <class Solver>
-double SplitRows<Solver>::times(int i, const double* y) const {
-  double sum = 0.0;
-  C_.visit(i, [&](int j, double c) { sum += c * y[j]; });
-  return sum;
+double SplitRows::left_of_dropped(const std::vector<double>& WT) const {
+  return std::max(most_left_of_dropped(d, C_, WT).tolerances,
+                  most_left_of_dropped(a, C_, WT).tolerances);
 }
 
-template <class Solver>
-LeftOfDropped SplitRows<Solver>::most_left(const Block& block,
-                                           const std::vector<double>& WT) const {
-  return most_left_of_dropped(block, n_, [&](int i) {  // |row_i(C WT)|
-    double sum = 0.0;
-    C_.visit(i, [&](int j, double c) {
-      if (block.contains(j)) sum += c * WT[at(j)] * (c * WT[at(j)]);
-    });
-    return std::sqrt(sum);
-  });
-}
-
-template <class Solver>
-double SplitRows<Solver>::left_of_dropped(const std::vector<double>& WT) const {
-  return std::max(most_left(d, WT).tolerances, most_left(a, WT).tolerances);
-}
-
-template <class Solver>
-bool SplitRows<Solver>::contradict(const std::vector<double>& WT) {
+bool SplitRows::contradict(const std::vector<double>& WT) {
   for (const Block* block : {&d, &a}) {
-    const LeftOfDropped left = most_left(*block, WT);
-    if (!(left.tolerances > kContradiction)) continue;
-    contradiction = contradiction_of(*block, left, constraints_);
+    const LeftOfDropped left = most_left_of_dropped(*block, C_, WT);
+    if (!(left.tolerances > kContradicts)) continue;
+    report_contradiction(*block, left, constraints_, evaluator_.report);
     return true;
   }
   return false;
 }
-
-template class SplitRows<linalg::MinimumNorm>;
-template class SplitRows<linalg::SparseMinimumNorm>;
 
 }  // namespace tether::ida_projection

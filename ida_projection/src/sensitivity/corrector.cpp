@@ -161,8 +161,7 @@ std::string SensitivityCorrector::set_up(N_Vector predicted) {
 int SensitivityCorrector::finish(Status status) {
   // The state's outcome stands unless this one is worse.
   if (status == Status::success) return 0;
-  const std::string& text = message_.empty() ? rows_->message() : message_;
-  return state_.report_.finish(status, text, state_.ida_.steps());
+  return state_.report_.finish(status, text(), state_.ida_.steps());
 }
 
 int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vector weights,
@@ -180,7 +179,7 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   if (flag != 0) return flag;
 
   use_rows_of_state();
-  rows_->forget_failure();
+  rows_->report.fatal = false;
   accept();
   Status status = evaluate(step);
   Fix fix;
@@ -226,8 +225,8 @@ void SensitivityCorrector::use_rows_of_state() {
                                 : &state_.constraints_;
   if (moved_ != rows || !rows_) {
     moved_ = rows;
-    rows_ = make_tangent_rows(*rows, state_.options_, state_.statistics_, s_);
-    const auto m = static_cast<std::size_t>(rows_->rows());
+    rows_ = make_rows(*rows, state_.options_, state_.statistics_, s_);
+    const auto m = static_cast<std::size_t>(rows_->count());
     r_.assign(m, 0.0);
     row_terms_.assign(static_cast<std::size_t>(count()), r_);
   }
@@ -252,12 +251,12 @@ Status SensitivityCorrector::evaluate(const StepData& step) {
   y_ = step.y;
   IDAGetErrWeights(state_.ida_.mem(), weights_);
   N_Vector id = state_.run_.engaged ? state_.movers_.joined.moved_id() : nullptr;
-  Status status = rows_->evaluate(step.t, y_, weights_, id);
+  Status status = rows_->linearise(step.t, y_, weights_, id);
   if (status == Status::success && metrics_.empty()) {
     Mover* mover = state_.movers_.joined.mover() != nullptr ? state_.movers_.joined.mover()
                                                             : state_.movers_.own.get();
     if (!mover->rows().metric(D_)) N_VInv(weights_, D_);
-    status = rows_->factor(D_);
+    status = rows_->factor_in(D_);
   }
   return status;
 }
@@ -272,7 +271,7 @@ Status SensitivityCorrector::factor(const Candidate& candidate, int k, bool firs
     metric.update_scale(own, work_, spare_);
     metric.set(own, spare_);
   }
-  return rows_->factor(metric.D());
+  return rows_->factor_in(metric.D());
 }
 
 // Equations of F among the rows are solved by Newton's iteration already: r_ = 0 for them.
@@ -295,10 +294,10 @@ Status SensitivityCorrector::find_moves(const Candidate& candidate, double t, bo
       if (known != Status::success) return known;
     }
     Status status = factor(candidate, k, first);
-    if (status == Status::success) status = rows_->product(s_, r_.data());
+    if (status == Status::success) status = rows_->product(s_, r_);
     if (status != Status::success) return status;
     add_terms(k);
-    rows_->solve(r_, ds_[i]);
+    rows_->solve_for(r_, ds_[i]);
     const double length = N_VWrmsNorm(ds_[i], vectors_of(candidate.weights)[k]);
     if (!std::isfinite(length)) {
       message_ = "the move of sensitivity " + std::to_string(k) + " is not finite";

@@ -10,7 +10,6 @@
 
 #include "attach/impl.hpp"
 #include "movers/vector/vector_metric.hpp"
-#include "sensitivity/tangent_rows.hpp"
 
 namespace tether::ida_projection {
 
@@ -33,7 +32,7 @@ class SensitivityCorrector final : public Companion {
   /// A new run of the state begins.
   void forget_run() override;
   int count() const { return given_.count; }
-  /// Onto the rows at (t, y), then sp; consistency.cpp.
+  /// Onto the rows at (t, y), then sp; starts.cpp.
   void make_consistent(double t, N_Vector y, N_Vector yp, N_Vector weights, N_Vector* s,
                        N_Vector* sp, ConsistencyReport& report);
 
@@ -53,6 +52,7 @@ class SensitivityCorrector final : public Companion {
   void note_setups(double cj);
   Status evaluate(const StepData& step);
   Status factor(const Candidate& candidate, int k, bool first);
+  const std::string& text() const { return message_.empty() ? rows_->report.text : message_; }
   void accept();
   Status move_and_polish(const Candidate& candidate, const StepData& step, double tolerance,
                          Fix& fix);
@@ -74,7 +74,7 @@ class SensitivityCorrector final : public Companion {
   Owned<SUNNonlinearSolver, SUNNonlinSolFreeEmpty> solver_;  // IDAS sees it
 
   const Constraints* moved_ = nullptr;  // the caller's rows, or joined with equations of F
-  std::unique_ptr<TangentRows> rows_;
+  std::unique_ptr<RowsAt> rows_;
   OwnedVector D_, weights_, s_, work_, spare_;
   N_Vector y_ = nullptr;                        // the accepted candidate
   std::vector<VectorMetric> metrics_;           // of each parameter; empty: the state's for all

@@ -55,7 +55,7 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
     if (!plain)
       found = find_joined_equations(rows, residual, free, candidate.t, y, WT, options_.hold, id);
   }
-  if (rows.fatal()) corrector_.stop(-1, rows.message());
+  if (rows.report.fatal) corrector_.stop(-1, rows.report.text);
   if (found.moves.empty()) return;
   moved_id_ = OwnedVector(candidate.base);
   for (std::size_t j = 0; j < n; ++j)

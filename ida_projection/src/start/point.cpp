@@ -64,16 +64,16 @@ bool PointProjection::damped_step(const Candidate& point, double length, double 
                                   double* left) {
   for (double s = 1.0; s >= kSmallestDamping; s *= 0.5) {
     N_VLinearSum(1.0, from_, -s, dy_, point.correction);
-    rows_->restart(point);
+    rows_->follow(point, nullptr);
     if (rows_->value(point.t, false) != Status::success) {
-      if (rows_->fatal()) return false;
+      if (rows_->report.fatal) return false;
       continue;
     }
     *left = rows_->solve(Solve::point).length;
     if (*left <= (1.0 - 0.5 * s) * length + floor) return true;
   }
   N_VScale(1.0, from_, point.correction);
-  rows_->restart(point);
+  rows_->follow(point, nullptr);
   return false;
 }
 
@@ -81,7 +81,7 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
   if ((report.status = rows_->load(point, true)) != Status::success ||
       (report.status = rows_->value(point.t, true)) != Status::success)
     return;
-  report.drift_before = rows_->drift();
+  report.drift_before = rows_->drift;
   double previous = -1.0;
   int halvings_in_a_row = 0;
   for (report.iterations = 0; report.iterations < kMaximumIterations; ++report.iterations) {
@@ -90,7 +90,7 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
     const Solution next = rows_->solve(Solve::point);
     report.rank = next.rank;
     const double length = next.length;
-    const double floor = 64.0 * kEpsilon * rows_->size();
+    const double floor = 64.0 * kEpsilon * N_VWrmsNorm(point.base, point.weights);
     if (length <= std::max(kConverged, floor)) return;
     // Rounding: small already, and no longer shrinking.
     if (previous >= 0.0 && length <= 1e4 * floor && length > 0.5 * previous) return;
@@ -102,7 +102,7 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
 
     N_VScale(1.0, point.correction, from_);
     if ((report.status = rows_->apply(1.0, point)) != Status::success) return;
-    if (!rows_->gives_g()) {
+    if (rows_->kind == RowsAt::Kind::projection) {
       ++report.iterations;
       return;
     }
@@ -111,12 +111,12 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
     if (!damped_step(point, length, floor, &left)) {
       // Almost dependent rows magnify rounding into moves that lead nowhere.
       report.status = rows_->value(point.t, false);
-      if (report.status == Status::success && !rows_->rounding_only())
+      if (report.status == Status::success && !rows_->is_rounding())
         report.status = Status::not_converged;
       return;
     }
     // Seen with the current factors: others would only confirm it, where no row waits to come back.
-    if (rows_->may_test_with_factors() && left <= std::max(kConverged, floor)) {
+    if (rows_->factors == RowsAt::Factors::of_all_rows && left <= std::max(kConverged, floor)) {
       ++report.iterations;
       return;
     }
@@ -126,17 +126,17 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
 
 // Says what became of newton().
 bool PointProjection::found(ConsistencyReport& report) {
-  report.drift_after = rows_->drift();
+  report.drift_after = rows_->drift;
   const bool ended = report.status == Status::success || report.status == Status::not_converged;
-  if (rows_->fatal()) {
+  if (rows_->report.fatal) {
     report.status = Status::callback_fatal;
-    report.message = rows_->message;
+    report.message = rows_->report.text;
   } else if (!ended) {
-    report.message = rows_->message;
+    report.message = rows_->report.text;
   } else if (rows_->contradicts()) {
     report.status = Status::inconsistent;
-    report.message = rows_->message;
-    report.contradicting_rows = rows_->contradicting;
+    report.message = rows_->report.text;
+    report.contradicting_rows = rows_->report.rows;
   } else if (report.status == Status::not_converged) {
     report.message = "no point on the constraints was found near the given one: |g| is " +
                      brief(report.drift_before) + " there and stalls at " +
@@ -155,19 +155,35 @@ void PointProjection::project(double t, N_Vector y, const std::vector<bool>& hol
   begin(y, weights);
   Candidate point{t, y, correction_, weights_};
   if (has_values(constraints_)) point.with_entries();
-  rows_->forget_failure();
+  rows_->report.fatal = false;
   report.status = arrange(point, hold, id);
   if (report.status == Status::success) newton(point, report);
   if (found(report)) N_VLinearSum(1.0, y, 1.0, correction_, y);
 }
 
-bool PointProjection::tangent(double t, N_Vector yp, ConsistencyReport& report) {
-  if (!rows_) return false;
-  const bool along = rows_->tangent(t, yp);
-  if (!rows_->fatal()) return along;
-  report.status = Status::callback_fatal;
-  report.message = rows_->message;
-  return false;
+// y' <- y' - dy' with C dy' = C y' + g_t, g_t by central differences.
+bool PointProjection::tangent(double t, N_Vector y, N_Vector yp, N_Vector id,
+                              ConsistencyReport& report) {
+  if (!rows_ || rows_->kind != RowsAt::Kind::entries) return false;
+  const double h = std::cbrt(kEpsilon) * std::max(1.0, std::abs(t));
+  const auto m = static_cast<std::size_t>(rows_->count());
+  std::vector<double> ahead(m), behind(m), defect(m);
+  N_VInv(weights_, dy_);
+  const bool known = rows_->value_at(t + h, y, ahead) == Status::success &&
+                     rows_->value_at(t - h, y, behind) == Status::success &&
+                     rows_->linearise(t, y, weights_, id) == Status::success &&
+                     rows_->factor_in(dy_) == Status::success &&
+                     rows_->product(yp, defect) == Status::success;
+  for (std::size_t i = 0; i < m; ++i) defect[i] += (ahead[i] - behind[i]) / (2.0 * h);
+  if (known) {
+    rows_->solve_for(defect, dy_);
+    N_VLinearSum(1.0, yp, -1.0, dy_, yp);
+  }
+  if (rows_->report.fatal) {
+    report.status = Status::callback_fatal;
+    report.message = rows_->report.text;
+  }
+  return known;
 }
 
 }  // namespace tether::ida_projection

@@ -25,9 +25,9 @@ class PointProjection {
   /// message, iterations, drift, rank and rows.
   void project(double t, N_Vector y, const std::vector<bool>& hold, N_Vector id, N_Vector weights,
                ConsistencyReport& report);
-  /// After project(): replaces yp by the nearest solution of C y' + g_t = 0 in the weights. Returns
-  /// false if it was not found; `report` tells if a callback ended the run.
-  bool tangent(double t, N_Vector yp, ConsistencyReport& report);
+  /// After project() has found y: replaces yp by the nearest solution of C y' + g_t = 0 in the
+  /// weights. Returns false if it was not found; `report` tells if a callback ended the run.
+  bool tangent(double t, N_Vector y, N_Vector yp, N_Vector id, ConsistencyReport& report);
 
  private:
   void begin(N_Vector y, N_Vector weights);

@@ -57,8 +57,8 @@ class RowFaults {
   std::string unkept_text(int row, const std::string& where, double rate, double terms) const;
   /// A callback that asked for the end of the run ends it.
   void pass_end_to(Corrector& corrector) {
-    if (evaluator_.fatal()) corrector.stop(-1, evaluator_.message());
-    evaluator_.forget();
+    if (evaluator_.report.fatal) corrector.stop(-1, evaluator_.report.text);
+    evaluator_.report.fatal = false;
   }
 
  private:

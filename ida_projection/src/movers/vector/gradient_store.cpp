@@ -7,16 +7,19 @@
 
 #include "host/rounding.hpp"
 #include "movers/vector/vector_rows.hpp"
+#include "rows/row_trust.hpp"
 
 namespace tether::ida_projection {
 
-GradientStore::GradientStore(const Constraints& constraints, Statistics& statistics, N_Vector like)
-    : constraints_(constraints),
+GradientStore::GradientStore(const Constraints& constraints, Statistics& statistics, N_Vector like,
+                             RowsReport& report)
+    : rows(constraints.total_count(), like),
+      g(static_cast<std::size_t>(rows.rows()), 0.0),
+      constraints_(constraints),
       statistics_(statistics),
+      report_(report),
       work_(like),
-      rows_(constraints.total_count(), like),
-      g_(static_cast<std::size_t>(rows_.rows()), 0.0),
-      terms_(g_) {
+      terms_(g) {
   flatten(constraints, 0);
 }
 
@@ -28,29 +31,20 @@ int GradientStore::flatten(const Constraints& set, int first) {
   return first;
 }
 
-Status GradientStore::failed(int flag, const char* what, const std::string& thrown) {
-  report.text = std::string(what) +
-                (thrown.empty() ? " returned " + std::to_string(flag) : " threw: " + thrown);
-  if (flag < 0) report.fatal = true;
-  return flag > 0 ? Status::callback_recoverable : Status::callback_fatal;
-}
-
 Status GradientStore::value(double t, N_Vector y) {
   ++statistics_.value_evaluations;
   std::string thrown;
   for (const Part& part : parts_) {
-    double* const g = g_.data() + part.first;
+    double* const of_part = g.data() + part.first;
     double* const to = room_.begin(part.count, part.count);
-    std::copy_n(g, part.count, to);
-    const int flag = guarded([&] { return part.rows->value(t, y, to); }, thrown);
-    if (!room_.end(g, part.count))
-      return failed(-1, "Gradients::value",
-                    "it writes past its end: Constraints::count is " + std::to_string(part.count));
-    if (flag != 0) return failed(flag, "Gradients::value", thrown);
+    std::copy_n(of_part, part.count, to);
+    int flag = guarded([&] { return part.rows->value(t, y, to); }, thrown);
+    if (!room_.end(of_part, part.count)) flag = kOverran;
+    if (flag != 0) return report_.failed(flag, "Gradients::value", thrown, part.count);
   }
-  for (int i = 0; i < rows_.rows(); ++i)
-    if (!std::isfinite(g_[static_cast<std::size_t>(i)])) {
-      report.text = "g of " + constraints_.name(i) + " is not finite";
+  for (int i = 0; i < rows.rows(); ++i)
+    if (!std::isfinite(g[static_cast<std::size_t>(i)])) {
+      report_.text = "g of " + constraints_.name(i) + " is not finite";
       return Status::not_finite;
     }
   return Status::success;
@@ -59,17 +53,17 @@ Status GradientStore::value(double t, N_Vector y) {
 Status GradientStore::fill(double t, N_Vector y) {
   ++statistics_.jacobian_evaluations;
   std::string thrown;
-  for (N_Vector row : rows_.gradients()) N_VConst(0.0, row);
+  for (N_Vector row : rows.gradients()) N_VConst(0.0, row);
   for (const Part& part : parts_) {
     const int flag = guarded(
-        [&] { return part.rows->fill(t, y, rows_.gradients().data() + part.first); }, thrown);
-    if (flag != 0) return failed(flag, "Gradients::fill", thrown);
+        [&] { return part.rows->fill(t, y, rows.gradients().data() + part.first); }, thrown);
+    if (flag != 0) return report_.failed(flag, "Gradients::fill", thrown, part.count);
   }
   return Status::success;
 }
 
 bool GradientStore::contains_algebraic(N_Vector id) {
-  for (N_Vector row : rows_.gradients()) {
+  for (N_Vector row : rows.gradients()) {
     N_VProd(id, row, work_);
     N_VLinearSum(1.0, row, -1.0, work_, work_);
     if (N_VMaxNorm(work_) > 0.0) return true;
@@ -80,7 +74,7 @@ bool GradientStore::contains_algebraic(N_Vector id) {
 void GradientStore::sum_terms(N_Vector y) {
   if (y->ops->nvl1norm == nullptr) return;
   for (std::size_t i = 0; i < terms_.size(); ++i) {
-    N_VProd(rows_.gradients()[i], y, work_);
+    N_VProd(rows.gradients()[i], y, work_);
     terms_[i] = N_VL1Norm(work_);
   }
 }
@@ -92,38 +86,88 @@ Status GradientStore::factor(const VectorMetric& metric, N_Vector terms_at) {
 
 Status GradientStore::factor(N_Vector D, N_Vector WT) {
   ++statistics_.factorizations;
-  const int bad = rows_.factor(D, WT);
+  const int bad = rows.factor(D, WT);
   if (bad >= 0) {
-    report.text = "the gradient of " + constraints_.name(bad) + " is not finite";
+    report_.text = "the gradient of " + constraints_.name(bad) + " is not finite";
     return Status::not_finite;
   }
-  if (rows_.rank() < rows_.rows()) ++statistics_.rank_drops;
+  if (!whole()) ++statistics_.rank_drops;
   return Status::success;
 }
 
 bool GradientStore::contradict(N_Vector) {
-  std::vector<int> found = rows_.contradicting();
+  std::vector<int> found = rows.contradicting();
   if (found.empty()) return false;
-  report.contradicting(std::move(found), constraints_);
+  report_.contradicting(std::move(found), constraints_);
   return true;
 }
 
 bool GradientStore::rounding_only() const {
-  const double unit = 64.0 * kEpsilon;
-  for (std::size_t i = 0; i < g_.size(); ++i)
-    if (!(std::abs(g_[i]) <= unit * terms_[i])) return false;
+  for (std::size_t i = 0; i < g.size(); ++i)
+    if (!(std::abs(g[i]) <= kRoundingOfTerms * terms_[i])) return false;
   return true;
 }
 
 double GradientStore::drift() const {
   double largest = 0.0;
-  for (double g : g_) largest = std::max(largest, std::abs(g));
+  for (double value : g) largest = std::max(largest, std::abs(value));
   return largest;
 }
 
+namespace {
+
+/// Moves on the tangent, too.
+class Gradient final : public VectorRows<GradientStore> {
+ public:
+  Gradient(const Constraints& constraints, const Options& options, Statistics& statistics,
+           N_Vector like)
+      : VectorRows(constraints, options, statistics, like), WT_(like), D_(like) {
+    for (int i = 0; i < count(); ++i) C_.emplace_back(like);
+  }
+
+  int count() const override { return rows_.rows.rows(); }
+  Status value_at(double t, N_Vector y, std::vector<double>& g) override {
+    const Status status = rows_.value(t, y);
+    g = rows_.g;
+    return status;
+  }
+  // Algebraic components do not move where no row contains them.
+  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id) override {
+    const Status status = rows_.fill(t, y);
+    if (status != Status::success) return status;
+    for (std::size_t i = 0; i < C_.size(); ++i) N_VScale(1.0, rows_.rows.gradients()[i], C_[i]);
+    N_VConst(0.0, WT_);
+    (void)N_VInvTest(weights, WT_);
+    held_ = id != nullptr && !rows_.contains_algebraic(id) ? id : nullptr;
+    return status;
+  }
+  Status factor_in(N_Vector D) override {
+    for (std::size_t i = 0; i < C_.size(); ++i) N_VScale(1.0, C_[i], rows_.rows.gradients()[i]);
+    N_VScale(1.0, D, D_);
+    if (held_ != nullptr) N_VProd(D, held_, D_);
+    const Status status = rows_.factor(D_, WT_);
+    rows_.rows.keep_firm(RowTrust::kThin);
+    return status;
+  }
+  Status product(N_Vector s, std::vector<double>& r) override {
+    for (std::size_t i = 0; i < C_.size(); ++i) r[i] = N_VDotProd(C_[i], s);
+    return Status::success;
+  }
+  void solve_for(const std::vector<double>& r, N_Vector ds) override {
+    rows_.rows.solve(r, D_, ds);
+  }
+
+ private:
+  OwnedVector WT_, D_;
+  N_Vector held_ = nullptr;
+  std::vector<OwnedVector> C_;
+};
+
+}  // namespace
+
 std::unique_ptr<RowsAt> make_gradient_rows(const Constraints& constraints, const Options& options,
                                            Statistics& statistics, N_Vector like) {
-  return std::make_unique<VectorRows<GradientStore>>(constraints, options, statistics, like);
+  return std::make_unique<Gradient>(constraints, options, statistics, like);
 }
 
 }  // namespace tether::ida_projection

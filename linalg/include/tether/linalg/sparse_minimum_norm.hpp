@@ -34,6 +34,7 @@ namespace tether::linalg {
 class SparseMinimumNorm {
  public:
   static constexpr double kTolerance = 1e-14;  ///< of solve(), relative to |b|
+  static constexpr double kSolved = 1e-6;      ///< the same where Newton's next move takes the rest
 
   SparseMinimumNorm();
   ~SparseMinimumNorm();
