@@ -6,10 +6,11 @@
 #include <cmath>
 #include <numeric>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/least_squares.hpp>
+#include <tether/linalg/pivoted_qr.hpp>
 #include <tether/linalg/symmetric_eigen.hpp>
 
 #include "cones/cone_rows.hpp"
-#include "joints/held_start.hpp"
 
 namespace tether::contact::detail {
 
@@ -38,6 +39,62 @@ BodyCone::Column largest_speeds(const BodyCone& c, const std::vector<Vector6d>& 
   if (c.second >= 0) w += c.J2.cwiseAbs() * v[at(c.second)].cwiseAbs();
   for (const auto& [body, J] : c.others) w += J.cwiseAbs() * v[at(body)].cwiseAbs();
   return w;
+}
+
+constexpr double kRank = 1e-6;  // of rows in their own scale
+
+// A in that scale, and the scale.
+Eigen::MatrixXd scaled(const ConeProblem& problem, Eigen::VectorXd& scale) {
+  const Eigen::MatrixXd A = problem.dense_matrix();
+  scale = A.diagonal();
+  for (double& s : scale) s = s > 0 ? 1 / std::sqrt(s) : 0;
+  return scale.asDiagonal() * A * scale.asDiagonal();
+}
+
+// Whether contacts can share their loads in more than one way, as four wheels of a cart can. An
+// iteration may end at any lawful distribution and would jump between them from step to step.
+// (Slips that depend on each other, as in a chain on the floor, do not count: with a stress along
+// it the chain did not stay at rest.)
+bool share_loads(const ConeProblem& problem) {
+  Eigen::VectorXd scale;
+  const Eigen::MatrixXd A = scaled(problem, scale);
+  std::vector<int> rows;
+  for (std::size_t k = 0; k < problem.cones().size(); ++k)
+    if (is_contact(problem.cones()[k].kind)) rows.push_back(problem.first_row(static_cast<int>(k)));
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  if (n == 0) return false;
+  Eigen::MatrixXd normals(n, n);
+  for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index i = 0; i < n; ++i)
+      normals(i, j) = A(rows[at(static_cast<int>(i))], rows[at(static_cast<int>(j))]);
+  linalg::PivotedQr of_normals(kRank);
+  of_normals.factor(normals);
+  return of_normals.rank() < n;
+}
+
+// The least x, each row in its own scale, with A x = b: it depends on A and b alone. Sets x to it
+// and returns true if Coulomb's law allows it.
+bool hold_all(const ConeProblem& problem, double tolerance, linalg::VectorX& x) {
+  Eigen::VectorXd scale;
+  linalg::LeastSquares factor(kRank);
+  factor.factor(scaled(problem, scale));
+  const Eigen::VectorXd held =
+      scale.cwiseProduct(Eigen::VectorXd(factor.solve(scale.cwiseProduct(problem.b()))));
+  for (std::size_t k = 0; k < problem.cones().size(); ++k) {
+    const Cone& cone = problem.cones()[k];
+    const int first = problem.first_row(static_cast<int>(k));
+    const double normal = held[first];
+    if (is_contact(cone.kind) && !(normal >= 0)) return false;
+    bool lawful = true;
+    each_part(cone.kind, [&](int from, int count) {
+      lawful = lawful && held.segment(first + from, count).norm() <= bound_of(cone, from, normal);
+    });
+    if (!lawful) return false;
+  }
+  const double enough = 0.1 * tolerance * problem.b().cwiseAbs().maxCoeff();
+  if (!(problem.velocities(held).cwiseAbs().maxCoeff() <= enough)) return false;
+  x = held;
+  return true;
 }
 
 }  // namespace

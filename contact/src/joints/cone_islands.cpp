@@ -208,7 +208,7 @@ void ConeIslands::remember(BodySolver& others, const std::vector<PointContact>& 
 std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions& options, LawUse laws) {
   if (laws == LawUse::limits) return nullptr;
   return std::make_unique<ConeIslands>(mechanisms_, nullptr, laws, options, &near_,
-                                       std::exchange(first_, false) ? &moments_ : nullptr);
+                                       std::exchange(first_, false) ? &moments : nullptr);
 }
 
 }  // namespace tether::contact::detail

@@ -71,16 +71,11 @@ class RollingPart final : public IslandMaker {
  public:
   explicit RollingPart(const NearContacts& near) : near_(near) {}
 
-  const std::vector<std::pair<int, int>>& links() const override { return links_; }
   std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
-  /// Moments in the last problem of a step's velocities: one for each contact, world axes, N m s.
-  const std::vector<Eigen::Vector3d>& moments() const { return moments_; }
 
  private:
   const NearContacts& near_;
-  Mechanisms mechanisms_;                   // none
-  std::vector<std::pair<int, int>> links_;  // none
-  std::vector<Eigen::Vector3d> moments_;
+  Mechanisms mechanisms_;  // none
   bool first_ = true;
 };
 

@@ -1,5 +1,6 @@
-// Tether: rows of joints on velocities. SPDX-License-Identifier: BSD-3-Clause
-#include <tether/contact/joints.hpp>
+// Tether: rows of joints on velocities, and their one-dimensional laws.
+// SPDX-License-Identifier: BSD-3-Clause
+#include <tether/contact/joint_laws.hpp>
 
 #include <cmath>
 #include <stdexcept>
@@ -8,6 +9,16 @@
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
+
+namespace {
+
+void demand(bool holds, int joint, const char* what, double value, const char* range) {
+  if (!holds)
+    throw std::invalid_argument("joint " + std::to_string(joint) + ": " + what + " = " +
+                                detail::shown(value) + ": must be " + range);
+}
+
+}  // namespace
 
 void JointRows::clear() {
   start_.resize(1);
@@ -37,5 +48,37 @@ void JointRows::on(int body, const Vector6d& G) {
   terms_.push_back({body, G});
   ++start_.back();
 }
+
+void JointLaws::clear() {
+  rows_.clear();
+  laws_.clear();
+}
+
+void JointLaws::add_limit(int joint, double gap, double restitution) {
+  demand(std::isfinite(gap), joint, "gap", gap, "finite");
+  demand(restitution >= 0 && restitution <= 1, joint, "restitution", restitution, "0 to 1");
+  rows_.add(joint);
+  laws_.push_back({joint, true, gap, restitution, 0, 0});
+}
+
+void JointLaws::add_bounded(int joint, double rate, double bound) {
+  demand(bound >= 0 && std::isfinite(bound), joint, "bound", bound, ">= 0 and finite");
+  rows_.add(joint, rate);
+  laws_.push_back({joint, false, 0, 0, rate, bound});
+}
+
+void JointLaws::add_sprung(int joint, double stretch, double stiffness, double damping, double rate,
+                           double bound) {
+  demand(std::isfinite(stretch), joint, "stretch", stretch, "finite");
+  demand(stiffness >= 0 && std::isfinite(stiffness), joint, "stiffness", stiffness,
+         ">= 0 and finite");
+  demand(damping >= 0 && std::isfinite(damping) && stiffness + damping > 0, joint, "damping",
+         damping, ">= 0 and finite, and > 0 without stiffness");
+  demand(bound >= 0, joint, "bound", bound, ">= 0");
+  rows_.add(joint, rate);
+  laws_.push_back({joint, false, 0, 0, rate, bound, stretch, stiffness, damping});
+}
+
+void JointLaws::on(int body, const Vector6d& G) { rows_.on(body, G); }
 
 }  // namespace tether::contact

@@ -101,7 +101,6 @@ LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
   const JointLaws::Law& each = laws[law];
   LawState out;
   out.side = at_bound(law);
-  out.limit = each.limit;
   out.impulse = impulses[at(law)];
   out.body = moving_along(law);
   if (each.limit) return out;

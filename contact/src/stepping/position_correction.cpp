@@ -41,6 +41,7 @@ double PositionCorrection::bias(double gap, double dt) const {
 bool PositionCorrection::find_closing(const Impacts& impacts, const StepContacts& contacts,
                                       const BodySet& bodies) {
   closing_.clear();
+  closed_.clear();
   for (const Impact& i : impacts.list())
     if (i.restitution == 0 && contacts.gaps[at(i.contact)] > 0) closing_.push_back(i);
   if (closing_.empty()) return false;
@@ -62,7 +63,7 @@ bool PositionCorrection::find_closing(const Impacts& impacts, const StepContacts
 
 // Impulses start from those of the velocity solve; where a gap is left, from the part of them that
 // remains after the gap has taken its share of the approach.
-void PositionCorrection::solve_closing(const Impacts& impacts, double dt,
+void PositionCorrection::solve_closing(const std::vector<RigidBody>& free, double dt,
                                        const StepContacts& contacts) {
   part_.assign(contacts.points.size(), 1);
   for (const Impact& i : closing_)
@@ -78,14 +79,14 @@ void PositionCorrection::solve_closing(const Impacts& impacts, double dt,
     start_.impulses.push_back(part_[k] * contacts.impulses[k]);
   }
   closing_solver_.set_warm_start(start_);
-  closing_solver_.solve(impacts.free(), points_, solution_);
+  closing_solver_.solve(free, points_, solution_);
 }
 
-void PositionCorrection::close_gaps(const Impacts& impacts, double dt, const StepContacts& contacts,
+void PositionCorrection::close_gaps(const Impacts& impacts, const std::vector<RigidBody>& free,
+                                    double dt, const StepContacts& contacts,
                                     const std::vector<int>& moving, BodySet& bodies) {
-  closes_ = find_closing(impacts, contacts, bodies);
-  if (!closes_) return;
-  solve_closing(impacts, dt, contacts);
+  if (!find_closing(impacts, contacts, bodies)) return;
+  solve_closing(free, dt, contacts);
   for (const int i : moving)
     if (closing_body_[at(i)] != 0)
       shift(bodies, i, dt, solution_.velocities[at(i)] - bodies.motion[at(i)].velocity,
@@ -99,7 +100,7 @@ void PositionCorrection::take_back(double deepest, double negligible, double dt,
   points_.clear();
   bool corrects = false;
   for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    if (closes_ && closed_[k] != 0) continue;
+    if (!closed_.empty() && closed_[k] != 0) continue;
     points_.push_back(contacts.points[k]);
     points_.back().bias = bias(contacts.gaps[k], dt);
     corrects = corrects || contacts.gaps[k] < 0;

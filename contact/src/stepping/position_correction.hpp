@@ -6,7 +6,6 @@
 
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
-#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 
@@ -19,8 +18,9 @@ class PositionCorrection {
   /// and would leave its gap open. The positions of its island move as if the approach ended at the
   /// surface (bias gap / dt); this displacement is applied to positions only. Penetrations of such
   /// islands are reduced in the same solve.
-  void close_gaps(const Impacts& impacts, double dt, const StepContacts& contacts,
-                  const std::vector<int>& moving, BodySet& bodies);
+  /// free: velocities with the forces of the step, before impulses.
+  void close_gaps(const Impacts& impacts, const std::vector<RigidBody>& free, double dt,
+                  const StepContacts& contacts, const std::vector<int>& moving, BodySet& bodies);
   /// The least displacement, in the metric of the masses, that reduces penetrations deeper than
   /// `negligible`; open contacts may close. Islands whose gaps have just been closed are left out.
   void take_back(double deepest, double negligible, double dt, const StepContacts& contacts,
@@ -31,13 +31,12 @@ class PositionCorrection {
 
  private:
   bool find_closing(const Impacts& impacts, const StepContacts& contacts, const BodySet& bodies);
-  void solve_closing(const Impacts& impacts, double dt, const StepContacts& contacts);
+  void solve_closing(const std::vector<RigidBody>& free, double dt, const StepContacts& contacts);
   double bias(double gap, double dt) const;
 
   double error_reduction_, max_speed_;
-  bool closes_ = false;
   std::vector<Impact> closing_;
-  std::vector<char> closed_;        // contacts of islands whose gaps are closed
+  std::vector<char> closed_;        // contacts of islands whose gaps are closed; empty: none
   std::vector<char> closing_body_;  // bodies of these
   std::vector<double> part_;        // of its impulse that is left to a contact
   MovingIslands islands_;

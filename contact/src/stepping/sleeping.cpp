@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stepping/step_contacts.hpp"
+#include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
 

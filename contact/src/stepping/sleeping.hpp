@@ -9,7 +9,6 @@
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
-#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 

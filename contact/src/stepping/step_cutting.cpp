@@ -1,5 +1,5 @@
 // Tether: sub-steps that are cut at impacts. SPDX-License-Identifier: BSD-3-Clause
-#include "stepping/step_cutting.hpp"
+#include "stepping/step_halving.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -42,13 +42,31 @@ void append(const StepContacts& from, StepContacts& to) {
 
 }  // namespace
 
+void add_impulses(const StepContacts& part, StepContacts& sum) {
+  for (std::size_t k = 0; k < part.impulses.size(); ++k) {
+    if (part.impulses[k].isZero(0)) continue;
+    std::size_t j = 0;
+    while (j < sum.points.size() && sum.points[j].id != part.points[k].id) ++j;
+    if (j == sum.points.size()) {
+      sum.points.push_back(part.points[k]);
+      sum.gaps.push_back(part.gaps[k]);
+      sum.impulses.emplace_back(Vector3d::Zero());
+    }
+    sum.impulses[j] += part.impulses[k];
+    if (k >= part.moments.size()) continue;
+    sum.moments.resize(sum.points.size(), Vector3d::Zero());
+    sum.moments[j] += part.moments[k];
+  }
+}
+
 // Takes the islands that strike apart from the others. If they meet, the step is repeated with all
 // islands together; the cost counts against what cuts may cost.
 int StepCutting::take(const SubStep& s) {
   if (s.within != SubStep::Within::step) return take_islands(s);
   const auto begin = [&] {
     stepper_.met = false;
-    if (stepper_.joints) stepper_.joints->begin_sum();
+    joint_sum_.clear();
+    law_sum_.clear();
   };
   const StepMark start = stepper_.mark();
   const Tally before = stepper_.tally;
@@ -61,9 +79,13 @@ int StepCutting::take(const SubStep& s) {
     stepper_.tally = before;
     inside.within = SubStep::Within::cut;
     begin();
-    left = advance_(inside);
+    left = halving_.advance(inside);
   }
-  if (stepper_.joints) stepper_.joints->give_sum();
+  if (stepper_.joints) {
+    add_joint_impulses();
+    stepper_.joints->impulses = joint_sum_;
+    stepper_.joints->law_impulses() = law_sum_;
+  }
   stepper_.set_now(s);
   return left;
 }
@@ -93,7 +115,7 @@ int StepCutting::take_others(const StepMark& start, const std::vector<char>& str
   const StepMark end = stepper_.mark();
   const StepContacts struck = std::exchange(stepper_.contacts, {});
   stepper_.go_back(start);
-  const int left = advance_(s);
+  const int left = halving_.advance(s);
   for (const int i : stepper_.motion.moving()) {
     if (striking[at(i)] == 0) continue;
     bodies.position[at(i)] = end.bodies.position[at(i)];
@@ -113,7 +135,7 @@ int StepCutting::take_striking(const SubStep& s) {
   StepContacts sum;
   const auto add_to_sum = [&] {
     add_impulses(stepper_.contacts, sum);
-    if (stepper_.joints && stepper_.joints_active) stepper_.joints->add_to_sum();
+    if (stepper_.acting_joints) add_joint_impulses();
   };
   stepper_.cuts->remember(stepper_.solver->warm_start());
   double rest = s.length;
@@ -133,12 +155,21 @@ int StepCutting::take_striking(const SubStep& s) {
   return left;
 }
 
+void StepCutting::add_joint_impulses() {
+  const auto add = [](const std::vector<double>& from, std::vector<double>& to) {
+    to.resize(from.size());
+    for (std::size_t k = 0; k < from.size(); ++k) to[k] += from[k];
+  };
+  add(stepper_.joints->impulses, joint_sum_);
+  add(stepper_.joints->law_impulses(), law_sum_);
+}
+
 // Takes one side of a cut; `length` is that of the sub-step whose impulses the warm start has.
 int StepCutting::take_side(const SubStep& s, SubStep::Side side, double length) {
   SubStep part = s;
   part.side = side;
   stepper_.solver->scale_warm_start(s.length / length);
-  const int left = advance_(part);
+  const int left = halving_.advance(part);
   stepper_.solver->scale_warm_start(length / s.length);
   return left;
 }
@@ -182,7 +213,7 @@ StepCutting::Struck StepCutting::strike() {
   const bool in_turn = s.options.simultaneous_impacts == SimultaneousImpacts::in_turn;
   if (in_turn) before_turns_ = s.bodies.motion;
   if (!(in_turn ? take_impacts_in_turn() : take_impact())) return Struck::unsolved;
-  if (s.joints && s.joints_active)
+  if (s.acting_joints)
     s.joints->take_impact(in_turn ? before_turns_ : s.impacts->coming(), s.bodies, s.contacts);
   return Struck::impact;
 }
@@ -190,8 +221,7 @@ StepCutting::Struck StepCutting::strike() {
 // Solves the impact of the touching contacts. False: not solved, and nothing has changed.
 bool StepCutting::take_impact() {
   SubStepper& s = stepper_;
-  if (s.bounces_at_once)
-    s.bounces_at_once->choose(*s.impacts, *s.impacts, {}, s.bodies, s.contacts);
+  if (s.bounces_at_once) s.bounces_at_once->choose(*s.impacts, {}, s.bodies, s.contacts);
   const BodySolution& found = s.cuts->solve(s.bodies.motion, s.contacts);
   ++s.counts.contact_problems;
   s.counts.sweeps += found.sweeps;

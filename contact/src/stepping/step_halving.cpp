@@ -19,8 +19,7 @@ SubStep StepHalving::whole(double start, double length) const {
 
 int StepHalving::advance(SubStep s) {
   stepper_.set_now(s);
-  if (stepper_.joints && stepper_.joints_active && s.joint_halvings > 0 &&
-      !stepper_.resolves_joints()) {
+  if (stepper_.acting_joints && s.joint_halvings > 0 && !stepper_.resolves_joints()) {
     ++halved_by_joints_;
     --s.joint_halvings;
     return take_halves(s);

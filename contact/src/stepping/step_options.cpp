@@ -1,5 +1,6 @@
 // Tether: options of steps. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -115,17 +116,9 @@ BodyOptions closing_options(const SteppingOptions& o) {
 }  // namespace detail
 
 const char* name(Gyroscopic gyroscopic) {
-  switch (gyroscopic) {
-    case Gyroscopic::none:
-      return "none";
-    case Gyroscopic::explicit_step:
-      return "explicit";
-    case Gyroscopic::implicit_step:
-      return "implicit";
-    case Gyroscopic::momentum:
-      return "momentum";
-  }
-  return "?";
+  constexpr std::array names{"none", "explicit", "implicit", "momentum"};
+  const auto k = static_cast<std::size_t>(gyroscopic);
+  return k < names.size() ? names[k] : "?";
 }
 
 const char* name(RestitutionLaw law) {

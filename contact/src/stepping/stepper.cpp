@@ -99,12 +99,12 @@ bool Stepper::succeeded() const { return implementation_->steps.tally.succeeded;
 bool Stepper::joints_met() const { return implementation_->steps.tally.joints_met; }
 double Stepper::joint_drift() const {
   const auto& joints = implementation_->steps.joints;
-  return joints ? joints->drift() : 0;
+  return joints ? joints->drift : 0;
 }
 const std::vector<double>& Stepper::joint_impulses() const {
   static const std::vector<double> none;
   const auto& joints = implementation_->steps.joints;
-  return joints ? joints->impulses() : none;
+  return joints ? joints->impulses : none;
 }
 const std::vector<double>& Stepper::law_impulses() const {
   static const std::vector<double> none;
@@ -180,7 +180,7 @@ void Stepper::set_memory(const StepperMemory& m) {
   if (s.joints) {
     if (!m.vibration.mode.empty() && m.vibration.mode.size() != s.bodies.position.size())
       throw std::invalid_argument("stepping: a memory of the joints of other bodies");
-    s.joints->set_drift(m.drift);
+    s.joints->drift = m.drift;
     s.joints->set_vibration(m.vibration);
   }
   if (!s.sleeping) return;

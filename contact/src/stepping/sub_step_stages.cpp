@@ -105,8 +105,7 @@ void SubStepper::choose_cut() {
 }
 
 void SubStepper::choose_bounces() {
-  const bool laws = joints && joints_active;
-  restitution->choose(*impacts, *impacts, laws ? joints->strikes() : std::vector<Strike>(), bodies,
+  restitution->choose(*impacts, acting_joints ? joints->strikes() : std::vector<Strike>(), bodies,
                       contacts);
 }
 
@@ -173,7 +172,7 @@ void SubStepper::solve_contacts() {
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
   contacts.moments.clear();
   failed = false;
-  const bool laws = joints && joints->has_laws() && joints_active;
+  const bool laws = acting_joints && joints->has_laws();
   const bool of_cut = now.side != SubStep::Side::none;
   if ((contacts.points.empty() && !laws) || (of_cut && !laws && nothing_presses())) {
     solver->forget();
@@ -195,7 +194,7 @@ void SubStepper::solve_contacts() {
   take_velocities(solution, bodies);
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
   if (rolling && near->any_rolling())
-    contacts.moments = joints ? joints->moments() : rolling->moments();
+    contacts.moments = joints ? joints->moments : rolling->moments;
 }
 
 // Whether a shorter sub-step would not help: none is allowed, or there is an impact, whose impulse
@@ -221,14 +220,6 @@ void SubStepper::judge() {
   if (!(solution.error <= tally.residual)) tally.residual = solution.error;
 }
 
-void SubStepper::take_later_impacts() {
-  if (impacts->list().empty()) return;
-  const LaterImpacts::Counts taken = later->take(*near, *impacts, now.length, bodies, contacts);
-  counts.contact_problems += taken.problems;
-  counts.sweeps += taken.sweeps;
-  tally.bounces += taken.bounces;
-}
-
 // An impact may send a body towards others that its earlier velocity did not reach. The contacts
 // with them are added and the problem is solved again, three times at most; the next step finds the
 // rest.
@@ -249,7 +240,6 @@ void SubStepper::meet_others() {
     solve_contacts();
     if (end != SubStepEnd::whole) return;
     if (restitution) rebound();
-    take_later_impacts();
   }
 }
 
@@ -273,7 +263,7 @@ void SubStepper::end_sleep() {
 
 // Joint impulses for the end of the sub-step; if the iteration finds none, the sub-step is halved.
 void SubStepper::predict_joints() {
-  if (!joints_active) return;
+  if (!acting_joints) return;
   if (joints->predict(bodies, now.start, now.length) && resolves_joints()) return;
   if (now.joint_halvings > 0 && !unmeetable)
     end = SubStepEnd::unmet;
@@ -282,7 +272,7 @@ void SubStepper::predict_joints() {
 }
 
 void SubStepper::move_joints() {
-  if (!joints_active || joints->move(bodies, now.start, now.length, contacts)) return;
+  if (!acting_joints || joints->move(bodies, now.start, now.length, contacts)) return;
   tally.succeeded = tally.joints_met = false;
 }
 

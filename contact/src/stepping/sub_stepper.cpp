@@ -76,7 +76,8 @@ void SubStepper::make_solvers() {
   const BodyOptions o = contact_options(options);
   const double impact = threshold_speed(options.impact_threshold, options);
   const double bounce = threshold_speed(options.restitution_threshold, options);
-  const bool laws = joints && joints->has_laws(), bounces = near && near->any_restitution();
+  const bool laws = joints && joints->has_laws(),
+             bounces = near && near->any([](const Meeting&m) { return m.restitution > 0; });
   if (near && (near->any_rolling() || near->any_elliptic()))
     rolling = std::make_unique<RollingPart>(*near);
   if (joints && rolling) joints->set_rolling(*near);
@@ -90,16 +91,12 @@ void SubStepper::make_solvers() {
   if (bounces || laws) restitution = new_restitution(LawUse::plastic);
   if (laws) restitution->set_laws(*joints);
   if (!near) return;
-  later = std::make_unique<LaterImpacts>(impact, bounce, o, maker,
-                                         bounces ? new_restitution(LawUse::none) : nullptr);
   if (options.cut_at_impacts && !(options.accuracy > 0))
     cuts = std::make_unique<StepCuts>(o, maker);
   if (bounces && cuts) bounces_at_once = new_restitution(LawUse::none);
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0)
     positions = std::make_unique<PositionCorrection>(options, maker);
-  if (!laws) return;
-  later->set_laws(*joints);
-  if (cuts && options.simultaneous_impacts == SimultaneousImpacts::together)
+  if (laws && cuts && options.simultaneous_impacts == SimultaneousImpacts::together)
     cuts->set_laws(*joints);
 }
 
@@ -127,7 +124,7 @@ void SubStepper::observe(StepObserver observer) {
                                                            bool last) {
     static const std::vector<double> none;
     observer({effect, first, last, now.start, now.length, now.active, turned,
-              joints ? joints->impulses_at_end() : none});
+              joints ? joints->impulses_at_end : none});
   };
   for (std::size_t k = 0; k < stages.size(); ++k)
     stages[k].run = [this, tell, k, run = std::move(stages[k].run)] {
@@ -138,65 +135,82 @@ void SubStepper::observe(StepObserver observer) {
     };
 }
 
-void SubStepper::add_stage(const char* effect, void (SubStepper::*method)()) {
-  stages.push_back({effect, [this, method] { (this->*method)(); }});
-}
-
 void SubStepper::make_stages() {
   using S = SubStepper;
   motion.list(bodies, joints.get(), options.gyroscopic);
-  if (joints) add_stage("joints", &S::begin_joints);
+  const bool falls = options.gravity && cuts;
   const char* impact = restitution ? "restitution" : solver ? "collision" : "joints";
-  if (impacts) add_stage(impact, &S::remember_velocities);
-  if (options.gravity) add_stage("gravity", &S::apply_gravity);
-  if (falls()) add_stage("gravity", &S::remember_weight);
+  if (joints)
+    stage("joints", [](S& s) {
+      if (s.acting_joints) s.joints->begin(s.bodies, s.now.start);
+    });
+  if (impacts) stage(impact, [](S& s) { s.impacts->remember(s.bodies); });
+  if (options.gravity)
+    stage("gravity",
+          [](S& s) { s.motion.accelerate(s.now.length * *s.options.gravity, s.bodies); });
+  if (falls) stage("gravity", [](S& s) { s.motion.remember_weight(s.bodies); });
   after_forces = stages.size();
   if (motion.any_long()) {
     if (options.gyroscopic == Gyroscopic::explicit_step)
-      add_stage("gyroscopic term", &S::gyrate_explicit);
+      stage("gyroscopic term", [](S& s) { s.motion.gyrate_explicit(s.now.length, s.bodies); });
     if (options.gyroscopic == Gyroscopic::implicit_step)
-      add_stage("gyroscopic term", &S::gyrate_implicit);
+      stage("gyroscopic term", [](S& s) { s.motion.gyrate_implicit(s.now.length, s.bodies); });
   }
-  if (sleeping) add_stage("sleep", &S::hold_sleepers);
-  if (joints) add_stage("joints", &S::predict_joints);
-  if (falls()) add_stage("gravity", &S::find_falling);
-  if (near) {
-    add_stage("collision", &S::find_contacts);
-    add_stage(impact, &S::choose_impacts);
-    if (cuts) add_stage(impact, &S::choose_cut);
-    if (restitution) add_stage("restitution", &S::choose_bounces);
-    add_stage("contact", &S::solve_contacts);
-    if (restitution) add_stage("restitution", &S::rebound);
-    add_stage(impact, &S::take_later_impacts);
-    add_stage("collision", &S::meet_others);
-    if (positions) add_stage("penetration", &S::close_gaps);
-    if (positions) add_stage("penetration", &S::take_penetrations_back);
-    if (joints) add_stage("joints", &S::put_back_joints);
-  } else if (solver) {
-    if (restitution) add_stage("joints", &S::choose_bounces);
-    add_stage("joints", &S::solve_contacts);
-    if (restitution) add_stage("joints", &S::rebound);
-  }
-  add_stage("motion", &S::move);
-  if (falls()) add_stage("gravity", &S::fall);
-  if (motion.any_free_round()) add_stage("motion", &S::turn_round);
+  if (sleeping) stage("sleep", std::mem_fn(&S::hold_sleepers));
+  if (joints) stage("joints", std::mem_fn(&S::predict_joints));
+  if (falls) stage("gravity", [](S& s) { s.motion.find_falling(s.bodies); });
+  add_contact_stages(impact);
+  stage("motion", [](S& s) { s.motion.move(s.now.length, s.bodies); });
+  if (falls)
+    stage("gravity",
+          [](S& s) { s.motion.fall(*s.options.gravity, s.now.length, s.contacts, s.bodies); });
+  if (motion.any_free_round())
+    stage("motion", [](S& s) { s.motion.turn_round(s.now.length, s.bodies); });
   if (motion.any_free_long()) {
     if (options.gyroscopic == Gyroscopic::momentum)
-      add_stage("gyroscopic term", &S::turn_keeping_momentum);
+      stage("gyroscopic term",
+            [](S& s) { s.motion.turn_keeping_momentum(s.now.length, s.bodies); });
     else
-      add_stage("motion", &S::turn_plain);
+      stage("motion", [](S& s) { s.motion.turn_plain(s.now.length, s.bodies); });
   }
-  if (joints) add_stage("joints", &S::move_joints);
-  if (sleeping) add_stage("sleep", &S::end_sleep);
+  if (joints) stage("joints", std::mem_fn(&S::move_joints));
+  if (sleeping) stage("sleep", std::mem_fn(&S::end_sleep));
+}
+
+void SubStepper::add_contact_stages(const char* impact) {
+  using S = SubStepper;
+  if (near) {
+    stage("collision", std::mem_fn(&S::find_contacts));
+    stage(impact, std::mem_fn(&S::choose_impacts));
+    if (cuts) stage(impact, std::mem_fn(&S::choose_cut));
+  }
+  const char* contact = near ? "contact" : "joints";
+  if (restitution) stage(near ? impact : contact, std::mem_fn(&S::choose_bounces));
+  if (solver) stage(contact, std::mem_fn(&S::solve_contacts));
+  if (restitution) stage(near ? impact : contact, std::mem_fn(&S::rebound));
+  if (!near) return;
+  stage("collision", std::mem_fn(&S::meet_others));
+  if (positions)
+    stage("penetration", [](S& s) {
+      s.positions->close_gaps(*s.impacts, s.free_motion, s.now.length, s.contacts,
+                              s.motion.moving(), s.bodies);
+      s.positions->take_back(s.tally.deepest, negligible_depth(s.options, s.now.length),
+                             s.now.length, s.contacts, s.motion.moving(), s.bodies);
+    });
+  if (joints)
+    stage("joints", [](S& s) {
+      if (s.acting_joints) s.joints->put_back(s.bodies, s.now.start);
+    });
 }
 
 void SubStepper::set_now(const SubStep& s) {
   now = s;
   if (!joints) return;
-  joints_active =
+  const bool act =
       now.active == nullptr || std::any_of(motion.moving().begin(), motion.moving().end(),
                                            [&](int i) { return joints->holds(i) && now.has(i); });
-  joints->set_active(joints_active);
+  acting_joints = act ? joints.get() : nullptr;
+  joints->set_active(act);
 }
 
 SubStepEnd SubStepper::take() {

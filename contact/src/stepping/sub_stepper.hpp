@@ -8,7 +8,6 @@
 
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
-#include "stepping/impacts/later_impacts.hpp"
 #include "stepping/impacts/restitution.hpp"
 #include "stepping/impacts/step_cuts.hpp"
 #include "stepping/motion/free_motion.hpp"
@@ -16,7 +15,6 @@
 #include "stepping/motion/mid_step.hpp"
 #include "stepping/position_correction.hpp"
 #include "stepping/sleeping.hpp"
-#include "stepping/step_contacts.hpp"
 #include "stepping/step_settings.hpp"
 #include "stepping/sub_step.hpp"
 
@@ -77,8 +75,7 @@ struct SubStepper {
   std::unique_ptr<Impacts> impacts;
   std::unique_ptr<Restitution> restitution;
   std::unique_ptr<Restitution> bounces_at_once;  // of impacts that a step is cut at
-  std::unique_ptr<LaterImpacts> later;
-  std::unique_ptr<StepCuts> cuts;  // only where asked for
+  std::unique_ptr<StepCuts> cuts;                // only where asked for
   std::vector<Approach> approaches;
   std::unique_ptr<PositionCorrection> positions;  // only with error reduction
   std::unique_ptr<Sleeping> sleeping;             // only where bodies may sleep
@@ -87,11 +84,11 @@ struct SubStepper {
   std::vector<PointContact> turned;  // contacts as of the middle of the step
   BodySolution solution;
   std::unique_ptr<JointPart> joints;     // only where they have been added
+  JointPart* acting_joints = nullptr;    // the same where bodies that they hold take part
   std::unique_ptr<RollingPart> rolling;  // only where a meeting names it, or elliptic friction
 
   SubStep now;
   SubStepEnd end = SubStepEnd::whole;
-  bool joints_active = true;           // those that joints hold take part
   bool failed = false;                 // its problem, though it may be used
   bool unmeetable = false;             // joints, in this step: however short the sub-step
   bool met = false;                    // islands that were apart, in this step
@@ -100,53 +97,32 @@ struct SubStepper {
   StepCounts counts;                   // but for those of `tally`
 
  private:
-  void add_stage(const char* effect, void (SubStepper::*method)());
+  /// Adds a stage that calls run(*this).
+  template <class Run>
+  void stage(const char* effect, const Run& run) {
+    stages.push_back({effect, [this, run] { run(*this); }});
+  }
   void make_stages();
+  void add_contact_stages(const char* impact);
   void solve_problem();
   void hold_all();
   bool lets_slip();
   void judge();
   bool shortest() const;
   bool nothing_presses() const;
-  bool falls() const { return options.gravity && cuts; }
 
   void find_contacts();
   void set_gaps();
   void choose_cut();
+  void choose_impacts() { impacts->choose(*near, bodies, now.length, contacts); }
   void choose_bounces();
   void solve_contacts();
-  void take_later_impacts();
+  void rebound() { tally.bounces += restitution->apply(bodies, contacts); }
   void meet_others();
   void hold_sleepers();
   void end_sleep();
   void predict_joints();
   void move_joints();
-  void begin_joints() {
-    if (joints_active) joints->begin(bodies, now.start);
-  }
-  void put_back_joints() {
-    if (joints_active) joints->put_back(bodies, now.start);
-  }
-  void remember_velocities() { impacts->remember(bodies); }
-  void choose_impacts() { impacts->choose(*near, bodies, now.length, contacts); }
-  void rebound() { tally.bounces += restitution->apply(bodies, contacts); }
-  void close_gaps() {
-    positions->close_gaps(*impacts, now.length, contacts, motion.moving(), bodies);
-  }
-  void take_penetrations_back() {
-    positions->take_back(tally.deepest, negligible_depth(options, now.length), now.length, contacts,
-                         motion.moving(), bodies);
-  }
-  void apply_gravity() { motion.accelerate(now.length * *options.gravity, bodies); }
-  void gyrate_explicit() { motion.gyrate_explicit(now.length, bodies); }
-  void gyrate_implicit() { motion.gyrate_implicit(now.length, bodies); }
-  void move() { motion.move(now.length, bodies); }
-  void remember_weight() { motion.remember_weight(bodies); }
-  void find_falling() { motion.find_falling(bodies); }
-  void fall() { motion.fall(*options.gravity, now.length, contacts, bodies); }
-  void turn_round() { motion.turn_round(now.length, bodies); }
-  void turn_plain() { motion.turn_plain(now.length, bodies); }
-  void turn_keeping_momentum() { motion.turn_keeping_momentum(now.length, bodies); }
 };
 
 }  // namespace tether::contact::detail

@@ -50,7 +50,7 @@ Restitution::Restitution(RestitutionLaw, const BodyOptions& options, IslandMaker
     : solver_(options, maker, laws) {
   absent("restitution");
 }
-void Restitution::choose(const Impacts&, const Impacts&, const std::vector<Strike>&, const BodySet&,
+void Restitution::choose(const Impacts&, const std::vector<Strike>&, const BodySet&,
                          StepContacts&) {
   absent("restitution");
 }

@@ -62,7 +62,7 @@ endif()
 count(COMMAND ${EVERYTHING} free TOGGLE ${step} TOTAL free FUNCTIONS functions)
 list(FILTER functions INCLUDE REGEX "tether::")
 list(FILTER functions EXCLUDE REGEX
-  "Stepper::(step|Implementation::(step|check_lengths))|StepHalving::(whole|advance)|SubStepper::(set_now|take|apply_gravity|move|turn_round|is_finite|add_stage)|FreeMotion::(accelerate|move|turn_round)|detail::exponential")
+  "Stepper::(step|Implementation::(step|check_lengths))|StepHalving::(whole|advance)|SubStepper::(set_now|take|is_finite|make_stages)|FreeMotion::(accelerate|move|turn_round)|detail::exponential")
 message("free: ${free} instructions")
 if(functions)
   message(SEND_ERROR "without contacts these run: ${functions}")

@@ -10,6 +10,7 @@
 #include "joints/cone_islands.hpp"
 #include "problem/refuse.hpp"
 #include "stepping/motion/rotation.hpp"
+#include "stepping/stepper.hpp"
 
 namespace tether::contact::detail {
 
@@ -29,8 +30,10 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
       gyroscopic_(gyroscopic),
       has_laws_(equations_->has_laws()),
       v_(bodies.motion.size(), Vector6d::Zero()),
-      row_(at(equations_->rows())),
-      impulses_(row_.g.size()) {
+      g_(at(equations_->rows())),
+      b_(g_.size()) {
+  impulses.resize(g_.size());
+  impulses_at_end.resize(g_.size());
   factor(bodies, 0);
   for (int i = 0; i < bodies.size(); ++i)
     if (holds(i)) held_.push_back(i);
@@ -38,7 +41,7 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
   place_.resize(held_.size());
   for (int m = 0; m < mechanisms_.count(); ++m) {
     const std::vector<int>& list = mechanisms_[m].bodies();
-    for (std::size_t k = 1; k < list.size(); ++k) links_.emplace_back(list[k - 1], list[k]);
+    for (std::size_t k = 1; k < list.size(); ++k) links.emplace_back(list[k - 1], list[k]);
   }
   std::multiset<std::pair<int, int>> pairs;
   for (int row = 0; row < rows_.count(); ++row) {
@@ -60,7 +63,7 @@ std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& option
   const bool rolls = near_ != nullptr && laws != LawUse::limits;
   return std::make_unique<ConeIslands>(
       mechanisms_, &laws_, laws, options, rolls ? near_ : nullptr,
-      rolls && std::exchange(first_islands_, false) ? &moments_ : nullptr);
+      rolls && std::exchange(first_islands_, false) ? &moments : nullptr);
 }
 
 void StepJoints::list_laws(std::vector<LawState>& out) const {
@@ -84,9 +87,9 @@ void StepJoints::rows_at(const BodySet& bodies, double t, JointRows& rows) {
     throw std::invalid_argument(what + " (JointEquations::add_rows at t = " + shown(t) +
                                 " s): rows and their bodies do not change");
   };
-  if (at(rows.count()) != row_.g.size())
+  if (at(rows.count()) != g_.size())
     refuse_other("joints: " + std::to_string(rows.count()) + " rows instead of " +
-                 std::to_string(row_.g.size()));
+                 std::to_string(g_.size()));
   const bool first = bodies_of_rows_.empty();
   std::size_t k = 0;
   for (int row = 0; row < rows.count(); ++row) {
@@ -121,7 +124,7 @@ void StepJoints::check_laws(const BodySet& bodies) {
   for (int law = 0; law < rows.count(); ++law)
     has_law[at(mechanisms_.mechanism_of(laws_.moving(law, mechanisms_)))] = 1;
   for (const int body : held_)
-    if (has_law[at(mechanisms_.mechanism_of(body))] != 0) under_laws_.push_back(body);
+    if (has_law[at(mechanisms_.mechanism_of(body))] != 0) under_laws.push_back(body);
 }
 
 void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
@@ -196,14 +199,14 @@ bool StepJoints::predict(BodySet& bodies, double t, double dt) {
   take_velocities(bodies);
   start_ = v_;
   mechanisms_.satisfy(rows_, v_);
-  bend_ = v_;
+  bend = v_;
   store(bodies);
   const bool reached = meet(bodies, t, dt);
   restore(bodies);
   give_velocities(bodies);
   double sum = 0;
   for (const int i : held_) {
-    bend_[at(i)] = v_[at(i)] - bend_[at(i)];
+    bend[at(i)] = v_[at(i)] - bend[at(i)];
     const Vector6d dv = v_[at(i)] - start_[at(i)];
     sum += bodies.mass[at(i)] * dv.head<3>().squaredNorm() +
            dv.tail<3>().dot(spin(bodies.inertia[at(i)], bodies.orientation[at(i)], dv.tail<3>()));
@@ -252,9 +255,9 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
       change_[at(p.second)].head<3>() += x;
       change_[at(p.second)].tail<3>() += p.r2.cross(x);
     }
-    if (moments_.empty()) continue;
-    if (holds(p.first)) change_[at(p.first)].tail<3>() -= moments_[c];
-    if (p.second >= 0 && holds(p.second)) change_[at(p.second)].tail<3>() += moments_[c];
+    if (moments.empty()) continue;
+    if (holds(p.first)) change_[at(p.first)].tail<3>() -= moments[c];
+    if (p.second >= 0 && holds(p.second)) change_[at(p.second)].tail<3>() += moments[c];
   }
   const JointRows& laws = laws_.laws.rows();
   for (int k = 0; k < laws.count(); ++k)
@@ -267,7 +270,7 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
       Eigen::Map<Eigen::Matrix<double, 6, 1>>(u.data() + 6 * k) =
           mechanisms_.root(list[k]).transpose() * change_[at(list[k])];
   }
-  mechanisms_.impulses(impulses_.data());
+  mechanisms_.impulses(impulses.data());
 }
 
 void StepJoints::add_bounded(bool plastic, const BodySet& bodies,
@@ -322,17 +325,39 @@ bool StepJoints::move(BodySet& bodies, double t, double dt, const StepContacts& 
   mechanisms_.satisfy(rows_, v_);
   met = met && mechanisms_.contradicting().empty();
   give_velocities(bodies);
-  mechanisms_.impulses(row_.x.data());
-  for (std::size_t row = 0; row < impulses_.size(); ++row) impulses_[row] += row_.x[row];
-  equations_->values(bodies, t + dt, row_.g.data());
-  drift_ = 0;
-  for (const double g : row_.g)
-    if (!(std::abs(g) <= drift_)) drift_ = std::isnan(drift_) ? drift_ : std::abs(g);
+  mechanisms_.impulses(impulses_at_end.data());
+  for (std::size_t row = 0; row < impulses.size(); ++row) impulses[row] += impulses_at_end[row];
+  equations_->values(bodies, t + dt, g_.data());
+  drift = 0;
+  for (const double g : g_)
+    if (!(std::abs(g) <= drift)) drift = std::isnan(drift) ? drift : std::abs(g);
   const auto rows = [this](const BodySet& at, double time, JointRows& out) {
     rows_at(at, time, out);
   };
-  frequency_.update(rows, rows_, impulses_, acceleration, t + dt, dt, mechanisms_, bodies);
-  return met && std::isfinite(drift_);
+  frequency_.update(rows, rows_, impulses, acceleration, t + dt, dt, mechanisms_, bodies);
+  return met && std::isfinite(drift);
 }
 
 }  // namespace tether::contact::detail
+
+namespace tether::contact {
+
+void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
+  detail::SubStepper& s = implementation_->steps;
+  if (s.joints || s.has_forces)
+    throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
+  if (!joints || joints->rows() == 0) return;
+  if (joints->has_laws() && s.options.law != Law::coulomb)
+    throw std::invalid_argument(
+        std::string(
+            "Stepper::add_joints: limits, motors and friction of joints need law = coulomb, "
+            "not ") +
+        name(s.options.law));
+  if (joints->has_laws() && s.options.restitution_law != RestitutionLaw::newton)
+    throw std::invalid_argument(
+        "Stepper::add_joints: limits, motors and friction of joints need restitution_law = newton");
+  s.add_joints(
+      std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic));
+}
+
+}  // namespace tether::contact

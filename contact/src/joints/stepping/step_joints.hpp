@@ -24,62 +24,30 @@ class StepJoints final : public JointPart {
              Gyroscopic gyroscopic);
 
   bool holds(int body) const override { return mechanisms_.mechanism_of(body) >= 0; }
-  const std::vector<std::pair<int, int>>& links() const override { return links_; }
   bool are_joined(int first, int second) const override;
   std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
   void set_rolling(const NearContacts& near) override {
     near_ = &near;
     first_islands_ = true;
   }
-  const std::vector<Eigen::Vector3d>& moments() const override { return moments_; }
 
-  /// Called at the start of a step, before its forces. Positions and velocities that the caller has
-  /// changed are put back onto the joints by the least change. Throws std::invalid_argument on
-  /// joints that contradict each other.
   void begin(BodySet& bodies, double t) override;
-  /// Called before the contacts are solved: velocities that meet the joints at the end of the step.
-  /// False: none were found, for instance because the step is too long.
   bool predict(BodySet& bodies, double t, double dt) override;
-  const std::vector<Vector6d>& bend() const override { return bend_; }
-  /// Makes the least move back onto the joints if something has moved the bodies since begin().
   void put_back(BodySet& bodies, double t) override;
-  /// Moves the bodies of the mechanisms to the end of the step. False: it does not meet the joints
-  /// to round-off.
   bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) override;
+  void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
+                   const StepContacts& contacts) override;
 
   bool has_laws() const override { return has_laws_; }
-  const std::vector<int>& under_laws() const override { return under_laws_; }
   void set_active(bool active) override { laws_.active = active; }
+  std::vector<double>& law_impulses() override { return laws_.impulses; }
   void add_bounded(bool plastic, const BodySet& bodies,
                    std::vector<RigidBody>& change) const override;
   void scale_restitution(const std::function<double(int)>& scale) override;
   void list_laws(std::vector<LawState>& out) const override;
   const std::vector<Strike>& strikes() const override { return laws_.strikes; }
-  const std::vector<double>& impulses_at_end() const override { return row_.x; }
-  const std::vector<double>& law_impulses() const override { return laws_.impulses; }
-
-  /// Largest |g| at the end of the last step, m or rad.
-  double drift() const override { return drift_; }
-  void set_drift(double drift) override { drift_ = drift; }
   const StepperMemory::Vibration& vibration() const override { return frequency_.memory(); }
   void set_vibration(const StepperMemory::Vibration& v) override { frequency_.set_memory(v); }
-  /// Impulses of the last step, by row.
-  const std::vector<double>& impulses() const override { return impulses_; }
-  void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
-                   const StepContacts& contacts) override;
-  void begin_sum() override {
-    sum_.assign(impulses_.size(), 0);
-    law_sum_.assign(laws_.impulses.size(), 0);
-  }
-  void add_to_sum() override {
-    for (std::size_t row = 0; row < sum_.size(); ++row) sum_[row] += impulses_[row];
-    for (std::size_t k = 0; k < law_sum_.size(); ++k) law_sum_[k] += laws_.impulses[k];
-  }
-  void give_sum() override {
-    add_to_sum();
-    impulses_ = sum_;
-    laws_.impulses = law_sum_;
-  }
 
  private:
   // Relative to the size of the mechanism, the root of mass times squared distance from the origin:
@@ -105,12 +73,6 @@ class StepJoints final : public JointPart {
     std::vector<Eigen::Vector3d> position_;
     std::vector<linalg::Quaternion> orientation_;
     double time_ = 0;
-  };
-  // Newton's iteration for the joints at the end of a step, a number for each row.
-  struct RowVectors {
-    explicit RowVectors(std::size_t rows) : g(rows), b(rows), x(rows) {}
-    std::vector<double> g, b, x;
-    std::vector<double> u;  // the entries of a mechanism
   };
   void put_onto(BodySet& bodies, double t);
   void factor(const BodySet& bodies, double t);
@@ -138,22 +100,18 @@ class StepJoints final : public JointPart {
   LawRows laws_;
   const NearContacts* near_ = nullptr;  // only where a meeting names rolling friction
   bool first_islands_ = true;
-  std::vector<Eigen::Vector3d> moments_;  // of contacts, in the last problem of velocities
   JointRows rows_;
   std::vector<int> bodies_of_rows_;  // of the first rows; -1 behind each
   int laws_in_step_ = -1;            // of the first step
   std::vector<int> held_;            // bodies of mechanisms
   std::vector<char> round_;          // of them: of inertia 1
-  std::vector<std::pair<int, int>> links_, joined_;
+  std::vector<std::pair<int, int>> joined_;
   std::vector<Vector6d> v_, start_, change_;  // of all bodies; at the start of the step
-  std::vector<Vector6d> bend_;
-  RowVectors row_;
-  std::vector<double> impulses_, sum_, law_sum_;
-  std::vector<int> under_laws_;
-  std::vector<Place> place_;  // of held_, at the start of the step
+  std::vector<double> g_, b_;                 // by row
+  std::vector<double> u_;                     // the entries of a mechanism
+  std::vector<Place> place_;                  // of held_, at the start of the step
   FactoredAt factored_;
   JointFrequency frequency_;
-  double drift_ = 0;
   double left_ = 0;  // of the last least_move(): what no move takes back, in its metric
 };
 

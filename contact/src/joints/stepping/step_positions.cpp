@@ -37,18 +37,18 @@ double StepJoints::size(const BodySet& bodies) const {
 // Sets change_ to the least change of positions, over `dt`, that makes g vanish at time t. Returns
 // its length in the metric of the masses.
 double StepJoints::least_move(const BodySet& bodies, double t, double dt) {
-  equations_->values(bodies, t, row_.g.data());
+  equations_->values(bodies, t, g_.data());
   change_.assign(v_.size(), Vector6d::Zero());
   double square = 0;
   left_ = 0;
   for (int m = 0; m < mechanisms_.count(); ++m) {
     Mechanism& mechanism = mechanisms_[m];
     for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
-      row_.b[k] = -row_.g[at(mechanism.rows()[k])] / dt;
-    row_.u.resize(at(mechanism.entries()));
-    mechanism.least(row_.b.data(), row_.u.data());
-    mechanisms_.add(m, row_.u.data(), change_);
-    square += std::pow(norm(row_.u) * dt, 2);
+      b_[k] = -g_[at(mechanism.rows()[k])] / dt;
+    u_.resize(at(mechanism.entries()));
+    mechanism.least(b_.data(), u_.data());
+    mechanisms_.add(m, u_.data(), change_);
+    square += std::pow(norm(u_) * dt, 2);
     for (std::size_t k = 0; k < mechanism.rows().size(); ++k)
       left_ = std::max(left_, std::abs(mechanism.left(static_cast<int>(k))) * dt);
   }
@@ -61,7 +61,7 @@ bool StepJoints::is_rounding(const BodySet& bodies) const {
   double largest = 0;
   for (const int i : held_)
     largest = std::max(largest, bodies.position[at(i)].cwiseAbs().maxCoeff());
-  for (const double g : row_.g)
+  for (const double g : g_)
     if (!(std::abs(g) <= kRounding * largest)) return false;
   return true;
 }
@@ -117,12 +117,12 @@ void StepJoints::put_onto(BodySet& bodies, double t) {
 
 // The rows that least squares leave the most of.
 void StepJoints::refuse(const BodySet& bodies, double t) {
-  equations_->values(bodies, t, row_.g.data());
+  equations_->values(bodies, t, g_.data());
   double most = 0;
-  for (const double g : row_.g) most = std::max(most, std::abs(g));
+  for (const double g : g_) most = std::max(most, std::abs(g));
   std::set<std::string> names;
   for (int row = 0; row < rows_.count(); ++row)
-    if (!(std::abs(row_.g[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
+    if (!(std::abs(g_[at(row)]) < 0.1 * most)) names.insert(equations_->name(rows_.joint(row)));
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   throw std::invalid_argument("joints contradict each other at t = " + shown(t) +

@@ -9,9 +9,6 @@
 
 #include "problem/refuse.hpp"
 #include "stepping/detection/collide.hpp"
-#include "stepping/detection/polyhedra/round_contacts.hpp"
-#include "stepping/detection/polyhedra/seams.hpp"
-#include "stepping/detection/shape_parts.hpp"
 
 namespace tether::contact::detail {
 
@@ -65,51 +62,47 @@ double normal_velocity(const std::vector<RigidBody>& motion, const PointContact&
 
 NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
                            const std::vector<Meeting>& meetings, Law law, double near_part)
-    : surfaces_(std::move(surfaces)), law_(law), near_part_(near_part) {
+    : surfaces_(std::move(surfaces)),
+      has_friction_(law != Law::frictionless),
+      near_part_(near_part) {
   for (const Meeting& m : meetings) {
     check(m);
     meetings_[std::minmax({m.first, m.second})] = m;  // the last one of a pair counts
   }
   if (surfaces_.size() >= (1u << 24))
     throw std::invalid_argument("more than 16777215 surfaces");  // contact_id has 24 bits
-  for (std::size_t k = 0; k < surfaces_.size(); ++k) {
-    const Surface& s = surfaces_[k];
-    const std::string where = "surface " + std::to_string(k) + ": ";
-    if (s.body < 0 || s.body >= bodies.size())
-      throw std::invalid_argument(where + "names a body that does not exist");
-    if (s.material < 0) throw std::invalid_argument(where + "material must be >= 0");
-    if (!s.velocity.allFinite() || !s.angular_velocity.allFinite())
-      throw std::invalid_argument(where + "velocity and angular_velocity must be finite");
-    check(s.shape);
-    const bool plane = s.shape.kind == ShapeKind::plane;
-    const bool mesh = s.shape.kind == ShapeKind::mesh;
-    if ((plane || mesh) && moves(bodies, s.body))
-      throw std::invalid_argument(where + "a " + name(s.shape.kind) + " belongs to a fixed body" +
-                                  (mesh ? "; one that moves has its convex_parts()" : ""));
-    mesh_.push_back(mesh ? static_cast<int>(meshes_.size()) : -1);
-    if (mesh) meshes_.emplace_back(s.shape);
-    index_.push_back(plane ? ~static_cast<int>(planes_.size()) : static_cast<int>(bounded_.size()));
-    (plane ? planes_ : bounded_).push_back(static_cast<int>(k));
-  }
+  for (std::size_t k = 0; k < surfaces_.size(); ++k) add_surface(static_cast<int>(k), bodies);
   find_polyhedra(bodies);
   join_parts();
   take_axes();
-
-  pose_.resize(surfaces_.size());
-  for (const Surface& s : surfaces_) {
-    centred_.push_back(s.shape.kind == ShapeKind::sphere && s.shape.position.isZero(0));
-    size_.push_back(form(s.shape.kind).reach(s.shape));
-  }
-  reach_.resize(bounded_.size());
+  parts_.pose.resize(surfaces_.size());
   centre_.resize(bounded_.size());
   ball_.resize(bounded_.size());
-  still_.resize(bounded_.size());
-  for (std::size_t k = 0; k < bounded_.size(); ++k) {
-    const Surface& s = surface(bounded_[k]);
-    reach_[k] = form(s.shape.kind).reach(s.shape);
-    still_[k] = !moves(bodies, s.body);
-  }
   fixed_ = still_;
+}
+
+void NearContacts::add_surface(int k, const BodySet& bodies) {
+  const Surface& s = surface(k);
+  const std::string where = "surface " + std::to_string(k) + ": ";
+  if (s.body < 0 || s.body >= bodies.size())
+    throw std::invalid_argument(where + "names a body that does not exist");
+  if (s.material < 0) throw std::invalid_argument(where + "material must be >= 0");
+  if (!s.velocity.allFinite() || !s.angular_velocity.allFinite())
+    throw std::invalid_argument(where + "velocity and angular_velocity must be finite");
+  check(s.shape);
+  const bool plane = s.shape.kind == ShapeKind::plane, mesh = s.shape.kind == ShapeKind::mesh;
+  if ((plane || mesh) && moves(bodies, s.body))
+    throw std::invalid_argument(where + "a " + name(s.shape.kind) + " belongs to a fixed body" +
+                                (mesh ? "; one that moves has its convex_parts()" : ""));
+  mesh_.push_back(mesh ? static_cast<int>(meshes_.size()) : -1);
+  if (mesh) meshes_.emplace_back(s.shape);
+  index_.push_back(plane ? ~static_cast<int>(planes_.size()) : static_cast<int>(bounded_.size()));
+  (plane ? planes_ : bounded_).push_back(k);
+  centred_.push_back(s.shape.kind == ShapeKind::sphere && s.shape.position.isZero(0));
+  size_.push_back(form(s.shape.kind).reach(s.shape));
+  if (plane) return;
+  reach_.push_back(size_.back());
+  still_.push_back(!moves(bodies, s.body));
 }
 
 void NearContacts::take_axes() {
@@ -137,58 +130,41 @@ std::array<Vector3d, 2> NearContacts::scaled_tangents(const PointContact& c) con
           *m.friction_across / m.largest_friction() * c.normal.cross(along)};
 }
 
-bool NearContacts::any_static() const {
-  return law_ != Law::frictionless &&
-         std::any_of(meetings_.begin(), meetings_.end(),
-                     [](const auto& each) { return each.second.static_friction.has_value(); });
-}
-
-bool NearContacts::any_elliptic() const {
-  return law_ != Law::frictionless &&
-         std::any_of(meetings_.begin(), meetings_.end(),
-                     [](const auto& m) { return m.second.is_elliptic(); });
-}
-
 void NearContacts::set_resting(const std::vector<char>& resting) {
   for (std::size_t k = 0; k < bounded_.size(); ++k)
     still_[k] = fixed_[k] != 0 || resting[at(surface(bounded_[k]).body)] != 0;
 }
 
-// Lists the kinds of shapes that can meet by their materials. Refuses pairs of kinds for which no
-// algorithm exists, and makes the polyhedra that the others need.
+// Refuses pairs of kinds that can meet by their materials but for which no algorithm exists, and
+// makes the polyhedra that the others need.
 void NearContacts::find_polyhedra(const BodySet& bodies) {
   struct Kind {
-    ShapeKind kind;
-    bool moves, polyhedra;
+    bool moves = false, polyhedra = false;
     std::vector<int> surfaces;
   };
-  std::map<int, std::vector<Kind>> kinds;  // by material
+  std::map<int, std::map<ShapeKind, Kind>> kinds;  // by material
   for (std::size_t k = 0; k < surfaces_.size(); ++k) {
-    std::vector<Kind>& list = kinds[surfaces_[k].material];
-    const Surface& s = surfaces_[k];
-    auto found = std::find_if(list.begin(), list.end(),
-                              [&](const Kind& a) { return a.kind == s.shape.kind; });
-    if (found == list.end()) found = list.insert(found, {s.shape.kind, false, false, {}});
-    found->moves = found->moves || moves(bodies, s.body);
-    found->surfaces.push_back(static_cast<int>(k));
+    Kind& kind = kinds[surfaces_[k].material][surfaces_[k].shape.kind];
+    kind.moves = kind.moves || moves(bodies, surfaces_[k].body);
+    kind.surfaces.push_back(static_cast<int>(k));
   }
-  const auto meet = [&](Kind& a, Kind& b) {
-    if (!(a.moves || b.moves)) return;
-    if (&a == &b && a.surfaces.size() < 2) return;  // a surface does not meet itself
-    if (!has_collision(a.kind, b.kind))
-      throw std::invalid_argument(std::string("contact of ") + name(a.kind) + " and " +
-                                  name(b.kind) + " is not supported");
-    for (Kind* each : {&a, &b})
-      each->polyhedra = each->polyhedra || meet_as_polyhedra(a.kind, b.kind);
-  };
   for (const auto& [materials, m] : meetings_)
-    for (Kind& a : kinds[m.first])
-      for (Kind& b : kinds[m.second]) a.moves ? meet(a, b) : meet(b, a);
-  polyhedron_.resize(surfaces_.size());
+    for (auto& [a, of_a] : kinds[m.first])
+      for (auto& [b, of_b] : kinds[m.second]) {
+        const bool itself = &of_a == &of_b && of_a.surfaces.size() < 2;
+        if (!(of_a.moves || of_b.moves) || itself) continue;
+        if (!has_collision(a, b))
+          throw std::invalid_argument(std::string("contact of ") + name(of_a.moves ? a : b) +
+                                      " and " + name(of_a.moves ? b : a) + " is not supported");
+        for (Kind* each : {&of_a, &of_b})
+          each->polyhedra = each->polyhedra || meet_as_polyhedra(a, b);
+      }
+  parts_.polyhedron.resize(surfaces_.size());
   for (const auto& [material, list] : kinds)
-    for (const Kind& each : list)
-      if (each.polyhedra && is_polyhedron(each.kind))
-        for (const int k : each.surfaces) polyhedron_[at(k)] = make_polyhedron(surface(k).shape);
+    for (const auto& [kind, each] : list)
+      if (each.polyhedra && is_polyhedron(kind))
+        for (const int k : each.surfaces)
+          parts_.polyhedron[at(k)] = make_polyhedron(surface(k).shape);
 }
 
 // Boxes and hulls of one body and material that lie against each other are parts of one solid.
@@ -199,33 +175,15 @@ void NearContacts::join_parts() {
       solids[{surface(k).body, surface(k).material}].push_back(k);
   for (const auto& [body, numbers] : solids) {
     if (numbers.size() < 2) continue;
-    std::vector<Polyhedron> parts;
-    std::vector<Pose> poses;
+    std::vector<Polyhedron> shapes;
+    std::vector<Pose> on_body;
     for (const int k : numbers) {
       const Shape& s = surface(k).shape;
-      parts.push_back(make_polyhedron(s));
-      poses.push_back({s.position, s.orientation.toRotationMatrix()});
+      shapes.push_back(make_polyhedron(s));
+      on_body.push_back({s.position, s.orientation.toRotationMatrix()});
     }
-    const std::vector<std::vector<int>> touching = find_seams(parts, poses);
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      if (touching[i].empty()) continue;
-      touching_.resize(surfaces_.size());
-      for (const int j : touching[i]) touching_[at(numbers[i])].push_back(numbers[at(j)]);
-      polyhedron_[at(numbers[i])] = std::move(parts[i]);
-    }
+    parts_.join(numbers, std::move(shapes), on_body);
   }
-}
-
-// Whether no contact has the point x and the outward normal n: within the body, or on a surface
-// that goes on above the plane across n.
-bool NearContacts::is_seam(int k, const Vector3d& near, const Vector3d& n, double angle) const {
-  const std::vector<int>& others = touching_[at(k)];
-  if (others.empty()) return false;
-  // The point is beside an edge that a round shape overlaps.
-  const Vector3d x = into(polyhedron_[at(k)], pose_[at(k)], near);
-  return std::any_of(others.begin(), others.end(),
-                     [&](int j) { return rises_above(polyhedron_[at(j)], pose_[at(j)], x, n); }) &&
-         !is_on_open_piece(polyhedron_[at(k)], pose_[at(k)], x, n, angle);
 }
 
 const Meeting* NearContacts::meeting_of(int a, int b) const {
@@ -241,19 +199,9 @@ double NearContacts::size(const PointContact& c) const {
   return std::min(size_[at(first_surface(c))], size_[at(second_surface(c))]);
 }
 
-bool NearContacts::any_restitution() const {
-  return std::any_of(meetings_.begin(), meetings_.end(),
-                     [](const auto& m) { return m.second.restitution > 0; });
-}
-
-bool NearContacts::any_rolling() const {
-  return std::any_of(meetings_.begin(), meetings_.end(),
-                     [](const auto& m) { return m.second.rolls(); });
-}
-
 void NearContacts::set_pose(const BodySet& bodies, int surface) {
   const Surface& s = surfaces_[at(surface)];
-  Pose& pose = pose_[at(surface)];
+  Pose& pose = parts_.pose[at(surface)];
   const linalg::Quaternion& q = bodies.orientation[at(s.body)];
   pose.position = bodies.position[at(s.body)];
   if (!s.shape.position.isZero(0)) pose.position += q * s.shape.position;
@@ -266,8 +214,8 @@ void NearContacts::place(const BodySet& bodies, double dt) {
   for (const int k : with_axis_)
     axis_[at(k)] = bodies.orientation[at(surface(k).body)] * surface(k).friction_axis;
   for (std::size_t k = 0; k < bounded_.size(); ++k) {
-    centre_[k] = pose_[at(bounded_[k])].position;
-    // Meshes and planes add nothing to the margin: the size of the other shape decides.
+    centre_[k] = parts_.pose[at(bounded_[k])].position;
+    // Meshes add nothing to the margin: the size of the other shape decides.
     const double near = mesh_[at(bounded_[k])] < 0 ? near_part_ * reach_[k] : 0;
     ball_[k] = reach_[k] + near + way(bodies, k, dt);
   }
@@ -284,39 +232,19 @@ inline double NearContacts::way(const BodySet& bodies, std::size_t k, double dt)
 // Writes the near points of surfaces i and j into near_.
 void NearContacts::find_points(int i, int j, double margin) {
   const Shape &s = surface(i).shape, &t = surface(j).shape;
-  const Pose &S = pose_[at(i)], &T = pose_[at(j)];
+  const Pose &S = parts_.pose[at(i)], &T = parts_.pose[at(j)];
   near_.count = 0;
   if (mesh_[at(j)] >= 0) return meshes_[at(mesh_[at(j)])].collide(s, S, T, margin, near_);
   if (mesh_[at(i)] >= 0) {
     meshes_[at(mesh_[at(i)])].collide(t, T, S, margin, near_);
     return turn(near_, 0);
   }
-  const bool polyhedra = meet_as_polyhedra(s.kind, t.kind);
-  if (has_seams(i) || has_seams(j)) {
-    if (polyhedra || s.kind == ShapeKind::points || t.kind == ShapeKind::points)
-      return find_beside_seams(i, j, margin);
-  } else if (polyhedra) {
-    return polyhedra_.collide(s, polyhedron_[at(i)], S, t, polyhedron_[at(j)], T, margin, near_);
-  }
+  const bool seams = parts_.has_seams(i) || parts_.has_seams(j);
+  const bool points = s.kind == ShapeKind::points || t.kind == ShapeKind::points;
+  if (meet_as_polyhedra(s.kind, t.kind) || (seams && points))
+    return polyhedra_.collide(s, parts_.polyhedron[at(i)], S, t, parts_.polyhedron[at(j)], T,
+                              margin, near_, parts_.seam(i), parts_.seam(j));
   collide(s, S, t, T, margin, near_);
-}
-
-// The same where the directions of seams give no contacts.
-void NearContacts::find_beside_seams(int i, int j, double margin) {
-  const Shape &s = surface(i).shape, &t = surface(j).shape;
-  const Pose &S = pose_[at(i)], &T = pose_[at(j)];
-  const bool i_has = has_seams(i), j_has = has_seams(j);
-  const auto of_i = [&](const Vector3d& x, const Vector3d& n) {
-    return is_seam(i, S.position + x, n, kTie);
-  };
-  const auto of_j = [&](const Vector3d& x, const Vector3d& n) {
-    return is_seam(j, S.position + x, n, kTie);
-  };
-  SeamTest test_i, test_j;  // references: nothing is allocated
-  if (i_has) test_i = std::cref(of_i);
-  if (j_has) test_j = std::cref(of_j);
-  polyhedra_.collide(s, polyhedron_[at(i)], S, t, polyhedron_[at(j)], T, margin, near_,
-                     i_has ? &test_i : nullptr, j_has ? &test_j : nullptr);
 }
 
 // Serves round shapes on polyhedra, and polyhedra on meshes. A normal belongs to one point where
@@ -324,13 +252,15 @@ void NearContacts::find_beside_seams(int i, int j, double margin) {
 // at which the shape passes the edge of a part are none where the surface goes on in the plane.
 void NearContacts::drop_seams(int i, int j) {
   const ShapeKind a = surface(i).shape.kind, b = surface(j).shape.kind;
-  if ((!has_seams(i) && !has_seams(j)) || (is_polyhedron(a) && is_polyhedron(b))) return;
+  if ((!parts_.has_seams(i) && !parts_.has_seams(j)) || (is_polyhedron(a) && is_polyhedron(b)))
+    return;
   const auto is_curved = [](ShapeKind k) { return form(k).family() == ShapeForm::Family::curved; };
   const bool on_mesh = a == ShapeKind::mesh || b == ShapeKind::mesh;
   const bool curved = !on_mesh && (is_curved(a) || is_curved(b));
   const double angle = on_mesh ? kTie : curved ? kCurvedNormal : kUpright;
   const auto seam = [&](const NearPoint& p) {
-    return is_seam(i, p.on_first, -p.normal, angle) || is_seam(j, p.on_second, p.normal, angle);
+    return parts_.is_seam(i, p.on_first, -p.normal, angle) ||
+           parts_.is_seam(j, p.on_second, p.normal, angle);
   };
   const auto first = near_.point.begin();
   auto end = first + near_.count;
@@ -344,15 +274,9 @@ void NearContacts::drop_seams(int i, int j) {
   const bool capsule = a == ShapeKind::capsule || b == ShapeKind::capsule;
   end = std::remove_if(first, end, [&](const NearPoint& p) {
     return (capsule ? p.feature >= kCapsuleOnEdge : p.feature >= kCut && p.feature < kNoCut) &&
-           (goes_on(i, p.on_first, -p.normal) || goes_on(j, p.on_second, p.normal));
+           (parts_.goes_on(i, p.on_first, -p.normal) || parts_.goes_on(j, p.on_second, p.normal));
   });
   near_.count = static_cast<int>(end - first);
-}
-
-bool NearContacts::goes_on(int k, const Vector3d& x, const Vector3d& n) const {
-  return has_seams(k) && std::any_of(touching_[at(k)].begin(), touching_[at(k)].end(), [&](int j) {
-           return is_on_open_piece(polyhedron_[at(j)], pose_[at(j)], x, n, kTie);
-         });
 }
 
 void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) {
@@ -366,7 +290,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
   double margin = ball_[at(a)] - reach_[at(a)];
   if (b >= 0) margin += ball_[at(b)] - reach_[at(b)];
   find_points(i, j, margin);
-  if (!touching_.empty() && b >= 0) drop_seams(i, j);
+  if (!parts_.touching.empty() && b >= 0) drop_seams(i, j);
   // Impulses between two bodies act at one point, halfway: at two points a gap apart, friction
   // would change their common angular momentum.
   const double part = moves(bodies, s.body) && moves(bodies, t.body) ? 0.5 : 0;
@@ -388,7 +312,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
     c.r2 = centred_[at(j)] ? Vector3d((t.shape.radius + part * p.gap) * p.normal)
                            : Vector3d(p.on_second - half - bodies.position[at(t.body)]);
     c.normal = p.normal;
-    c.mu = law_ == Law::frictionless ? 0 : m->largest_friction();
+    c.mu = has_friction_ ? m->largest_friction() : 0;
     if (conveys) {
       c.slip = surface_velocity(bodies, s, c.r1) - surface_velocity(bodies, t, c.r2);
       c.slip -= c.normal.dot(c.slip) * c.normal;
@@ -404,7 +328,7 @@ void NearContacts::pair(const BodySet& bodies, int a, int b, StepContacts& out) 
 template <class Use>
 void NearContacts::pairs(const BodySet& bodies, StepContacts& out, const Use& use) {
   for (int p = 0; p < static_cast<int>(planes_.size()); ++p) {
-    const Pose& plane = pose_[at(planes_[at(p)])];
+    const Pose& plane = parts_.pose[at(planes_[at(p)])];
     const Vector3d n = plane.rotation * surface(planes_[at(p)]).shape.normal;
     for (int k = 0; k < static_cast<int>(bounded_.size()); ++k)
       if (!still_[at(k)] && use(k, k) && n.dot(centre_[at(k)] - plane.position) < ball_[at(k)])
@@ -426,12 +350,12 @@ void NearContacts::follow(const BodySet& bodies, const PointContact& c, StepCont
   out.points.clear();
   out.gaps.clear();
   const int i = first_surface(c), j = second_surface(c);
-  const Pose first = pose_[at(i)], second = pose_[at(j)];
+  const Pose first = parts_.pose[at(i)], second = parts_.pose[at(j)];
   set_pose(bodies, i);
   set_pose(bodies, j);
   pair(bodies, index_[at(i)], index_[at(j)], out);
-  pose_[at(i)] = first;
-  pose_[at(j)] = second;
+  parts_.pose[at(i)] = first;
+  parts_.pose[at(j)] = second;
 }
 
 bool NearContacts::find_more(const BodySet& bodies, double dt, StepContacts& out) {

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
-#include <memory>
 #include <tether/contact/stepping.hpp>
 #include <utility>
 #include <vector>
@@ -11,6 +11,7 @@
 #include "stepping/detection/broadphase.hpp"
 #include "stepping/detection/mesh/mesh_contacts.hpp"
 #include "stepping/detection/polyhedra/polyhedra.hpp"
+#include "stepping/detection/polyhedra/seams.hpp"
 
 namespace tether::contact::detail {
 
@@ -46,25 +47,27 @@ class NearContacts {
   const Meeting& meeting(const PointContact& c) const;
   /// Reach of the smaller shape of a contact: distance of its farthest point from its origin, m.
   double size(const PointContact& c) const;
-  bool any_restitution() const;
-  bool any_rolling() const;
-  bool any_elliptic() const;
-  bool any_static() const;
+  /// Whether has(m) is true for any meeting.
+  template <class Has>
+  bool any(const Has& has) const {
+    for (const auto& each : meetings_)
+      if (has(each.second)) return true;
+    return false;
+  }
+  bool any_rolling() const { return any(std::mem_fn(&Meeting::rolls)); }
+  bool any_elliptic() const { return has_friction_ && any(std::mem_fn(&Meeting::is_elliptic)); }
+  bool any_static() const {
+    return has_friction_ && any([](const Meeting& m) { return m.static_friction.has_value(); });
+  }
   /// Two tangents at right angles of a contact with elliptic friction, after find(): each as long
   /// as its coefficient over the larger one, which is PointContact::mu.
   std::array<Eigen::Vector3d, 2> scaled_tangents(const PointContact& c) const;
 
  private:
+  void add_surface(int k, const BodySet& bodies);
   void find_polyhedra(const BodySet& bodies);
-  void find_beside_seams(int first, int second, double margin);
   void join_parts();
-  bool is_seam(int surface, const Eigen::Vector3d& x, const Eigen::Vector3d& n, double angle) const;
-  bool has_seams(int surface) const {
-    return !touching_.empty() && !touching_[static_cast<std::size_t>(surface)].empty();
-  }
   void drop_seams(int first, int second);  // in near_
-  // Whether a part beside surface k has x on an open face with the normal n.
-  bool goes_on(int k, const Eigen::Vector3d& x, const Eigen::Vector3d& n) const;
   void take_axes();
   const Meeting* meeting_of(int a, int b) const;  // of surfaces; null: they pass through
   void place(const BodySet& bodies, double dt);
@@ -77,19 +80,16 @@ class NearContacts {
 
   std::vector<Surface> surfaces_;
   std::map<std::pair<int, int>, Meeting> meetings_;  // by materials, the lower one first
-  Law law_;
+  const bool has_friction_;
   double near_part_;
   PolyhedraContacts polyhedra_;
-  std::vector<Polyhedron> polyhedron_;  // of each surface; empty where none is needed
-  // For each surface, other parts of its body that lie against it; empty where none does.
-  std::vector<std::vector<int>> touching_;
+  Parts parts_;
   std::vector<MeshContacts> meshes_;
   std::vector<int> mesh_;  // of each surface: its index in meshes_, or -1
   Broadphase broadphase_;
   std::vector<int> planes_, bounded_;  // surfaces
   std::vector<int> index_;             // of each surface: k in bounded_, or ~k in planes_
   // For each surface.
-  std::vector<Pose> pose_;
   std::vector<char> centred_;          // whether it is a sphere about the centre of its body
   std::vector<double> size_;           // its reach, infinite for planes
   std::vector<int> with_axis_;         // surfaces with a friction_axis

@@ -5,7 +5,7 @@
 // direction. It is applied to shapes that are shrunk by a part of their thickness, so that touching
 // shapes are apart. Newton's method then maximises s(n) on the sphere; where a line or a face makes
 // s not smooth, n is kept on that kink.
-#include "stepping/detection/nearest_directions.hpp"
+#include "stepping/detection/collide.hpp"
 
 #include <algorithm>
 #include <cmath>

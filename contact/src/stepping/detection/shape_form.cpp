@@ -1,5 +1,5 @@
 // Tether: parts that several kinds of shapes share. SPDX-License-Identifier: BSD-3-Clause
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,15 @@
 // Tether: the interface of a kind of shape to detection. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 #include <tether/contact/shapes.hpp>
+#include <vector>
 
 namespace tether::contact::detail {
 
@@ -76,5 +83,134 @@ const ShapeForm& form(ShapeKind kind);
     static const Form the_only_one;   \
     return the_only_one;              \
   }
+
+/// The feature of a surface that faces a direction: a point, the ends of a line, or the corners of
+/// a face, counterclockwise seen from outside. The `id` of a corner is the same in every step.
+struct Flat {
+  static constexpr int kMost = 32;
+  int count = 0;
+  std::array<Eigen::Vector3d, kMost> point;
+  std::array<int, kMost> id;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of a face, outwards
+
+  void add(const Eigen::Vector3d& p, int i) {
+    if (count == kMost) return;
+    point[static_cast<std::size_t>(count)] = p;
+    id[static_cast<std::size_t>(count++)] = i;
+  }
+};
+
+/// A solid shape at its pose, relative to a common origin, by its support function h(m) = max m .
+/// x. Balls and capsules are represented by their centre and axis; `round` is their radius.
+class ConvexShape {
+ public:
+  ConvexShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& about)
+      : origin(pose.position - about), rotation(pose.rotation), form_(&form(shape.kind)) {
+    form_->begin(shape, *this);
+    size = std::max(half.maxCoeff(), round);
+  }
+  /// A triangle, whose points must outlive this object. `thick` is the thickness of the shape that
+  /// it is compared with; the triangle itself has none, and farthest() never shrinks it.
+  ConvexShape(const std::vector<Eigen::Vector3d>& triangle, double thick)
+      : points(&triangle), thickness(thick), whole(true), form_(&form(ShapeKind::convex)) {
+    for (const Eigen::Vector3d& p : triangle) middle += p / 3;
+    for (const Eigen::Vector3d& p : triangle) size = std::max(size, (p - middle).norm());
+  }
+
+  /// Farthest point in direction m (any length) of the shape, shrunk by `less` times its thickness.
+  Eigen::Vector3d farthest(const Eigen::Vector3d& m, double less = 0) const {
+    return origin + rotation * form_->farthest(*this, rotation.transpose() * m, less);
+  }
+  /// Second derivative of h at a unit vector m, where it is smooth.
+  Eigen::Matrix3d curvature(const Eigen::Vector3d& m) const {
+    return rotation * form_->curvature(*this, rotation.transpose() * m) * rotation.transpose();
+  }
+  /// Kinks of h near m, within a tolerance in radian. Returns the unit direction of a straight line
+  /// of the surface at right angles to m, or zero; sets `face` to the normal of a face along m.
+  Eigen::Vector3d line(const Eigen::Vector3d& m, double tolerance, Eigen::Vector3d& face) const {
+    face.setZero();
+    return form_->line(*this, m, tolerance, face);
+  }
+  /// The feature that faces m: all that lies within kFlatAngle or within `height` of it.
+  void flat(const Eigen::Vector3d& m, double height, Flat& out) const {
+    out.count = 0;
+    out.normal.setZero();
+    form_->flat(*this, m, height, out);
+  }
+  const Eigen::Vector3d& centre() const { return whole ? middle : origin; }
+  Eigen::Vector3d axis(int k) const { return rotation.col(k); }
+
+  // Set by ShapeForm::begin: half the extent along each axis, and the mean of the points of a hull.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(), half = Eigen::Vector3d::Zero(),
+                  middle = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  const std::vector<Eigen::Vector3d>* points = nullptr;
+  double round = 0, thickness = 0, size = 0;
+  bool whole = false;  // farthest() ignores `less`
+
+ private:
+  const ShapeForm* form_;
+};
+
+// A tilt whose sine is smaller is rounding: it has no direction.
+constexpr double kUpright = 1e-9;
+
+inline double signed_one(double x) { return x < 0 ? -1 : 1; }
+
+inline void demand_positive(const Shape& shape, double x, const char* what) {
+  if (!(x > 0) || !std::isfinite(x))
+    throw std::invalid_argument(std::string(name(shape.kind)) + ": " + what +
+                                " must be > 0 and finite");
+}
+
+/// Throws std::invalid_argument unless there are at least so many finite points, not all at the
+/// origin.
+void check_points(const Shape& shape, std::size_t least);
+double reach_of_points(const Shape& shape);
+void points_on_plane(const Shape& shape, const Pose& pose, const Eigen::Vector3d& plane,
+                     const Eigen::Vector3d& n, double margin, NearPoints& out);
+
+/// Adds the contact of a point p, or of a ball, with the plane through `plane` with the normal n.
+inline void point_plane(const Eigen::Vector3d& p, const Eigen::Vector3d& plane,
+                        const Eigen::Vector3d& n, double margin, int feature, NearPoints& out) {
+  const double gap = n.dot(p - plane);
+  if (gap < margin) out.add(p, p - gap * n, n, gap, feature);
+}
+inline void ball_plane(const Eigen::Vector3d& centre, double radius, const Eigen::Vector3d& plane,
+                       const Eigen::Vector3d& n, double margin, int feature, NearPoints& out) {
+  const double distance = n.dot(centre - plane);
+  if (distance - radius < margin)
+    out.add(centre - radius * n, centre - distance * n, n, distance - radius, feature);
+}
+
+/// Nearest point to p of the ball about `centre`. Its normal is `out` if p is the centre.
+inline Nearest on_ball(const Eigen::Vector3d& centre, double radius, const Eigen::Vector3d& p,
+                       const Eigen::Vector3d& out) {
+  const Eigen::Vector3d d = p - centre;
+  const double distance = d.norm();
+  const Eigen::Vector3d n = distance > 0 ? Eigen::Vector3d(d / distance) : out;
+  return {centre + radius * n, n, distance - radius};
+}
+
+/// A corner of a box between -half and half.
+inline Eigen::Vector3d box_corner(int k, const Eigen::Vector3d& half) {
+  return {(k & 1) != 0 ? half.x() : -half.x(), (k & 2) != 0 ? half.y() : -half.y(),
+          (k & 4) != 0 ? half.z() : -half.z()};
+}
+
+/// Boxes and hulls, by their corners.
+class CorneredForm : public ShapeForm {
+ public:
+  explicit CorneredForm(int rank) : ShapeForm(Family::polyhedron, rank) {}
+  Eigen::Vector3d line(const ConvexShape& shape, const Eigen::Vector3d& m, double tolerance,
+                       Eigen::Vector3d& face) const override;
+  void flat(const ConvexShape& shape, const Eigen::Vector3d& m, double height,
+            Flat& out) const override;
+
+ private:
+  virtual int corner_count(const ConvexShape& shape) const = 0;
+  virtual Eigen::Vector3d corner(const ConvexShape& shape, int k) const = 0;  // body axes
+  void corners(const ConvexShape& shape, const Eigen::Vector3d& m, double height, Flat& out) const;
+};
 
 }  // namespace tether::contact::detail

@@ -19,7 +19,6 @@ void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
     c.bias = 0;
     list_.push_back({static_cast<int>(k), came, comes, epsilon});
   }
-  if (!list_.empty()) free_ = bodies.motion;
 }
 
 void Impacts::keep_only_impacts(StepContacts& contacts) {

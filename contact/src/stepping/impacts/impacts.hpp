@@ -8,9 +8,6 @@
 
 namespace tether::contact::detail {
 
-/// Contacts of an island whose impacts are taken one after the other, at most.
-constexpr int kFewContacts = 16;
-
 /// An impact: speed of approach before and with the forces of the step, > 0, m/s, and coefficient
 /// of restitution (0: too slow to bounce).
 struct Impact {
@@ -38,10 +35,6 @@ class Impacts {
   const std::vector<Impact>& list() const { return list_; }
   /// Removes all other contacts.
   void keep_only_impacts(StepContacts& contacts);
-  /// Velocities with the forces of the step, before impulses; only if there are impacts.
-  const std::vector<RigidBody>& free() const { return free_; }
-  /// An impact that the first ones have caused.
-  void add(const Impact& later) { list_.push_back(later); }
   /// Least speed of approach, m/s, of an impact.
   double least_speed(const NearContacts& near, const PointContact& c) const;
   /// Coefficient of restitution for this speed; 0: too slow to bounce.
@@ -52,7 +45,7 @@ class Impacts {
 
  private:
   double threshold_, restitution_threshold_;
-  std::vector<RigidBody> coming_, free_;
+  std::vector<RigidBody> coming_;
   std::vector<Impact> list_;
 };
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <tether/linalg/index.hpp>
 
-#include "stepping/impacts/step_energy.hpp"
 #include "stepping/motion/rotation.hpp"
+#include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
 
@@ -17,6 +17,24 @@ namespace {
 using linalg::at;
 
 constexpr double kRounding = 1e-14;  // of the kinetic energy of what changes
+
+// Kinetic energy of body i with velocities `now` against `came`, J.
+double kinetic_gain(const BodySet& bodies, std::size_t i, const RigidBody& now,
+                    const RigidBody& came) {
+  const Vector3d dw = now.angular_velocity - came.angular_velocity;
+  return 0.5 * bodies.mass[i] * (now.velocity - came.velocity).dot(now.velocity + came.velocity) +
+         0.5 * spin(bodies.inertia[i], bodies.orientation[i], dw)
+                   .dot(now.angular_velocity + came.angular_velocity);
+}
+
+// Work of the forces of a step on body i, which have changed its velocities by those of `change`:
+// their impulse times the velocities `now` that it moves with. For a weight it is the potential
+// energy that is lost, exactly.
+double work(const BodySet& bodies, std::size_t i, const RigidBody& change, const RigidBody& now) {
+  return bodies.mass[i] * change.velocity.dot(now.velocity) +
+         spin(bodies.inertia[i], bodies.orientation[i], change.angular_velocity)
+             .dot(now.angular_velocity);
+}
 
 }  // namespace
 
@@ -29,9 +47,8 @@ Restitution::Restitution(RestitutionLaw law, const BodyOptions& options, IslandM
                          LawUse laws)
     : law_(law), islands_(maker), solver_(cold(options), maker, laws) {}
 
-void Restitution::choose(const Impacts& chosen, const Impacts& forces,
-                         const std::vector<Strike>& limits, const BodySet& bodies,
-                         StepContacts& contacts) {
+void Restitution::choose(const Impacts& chosen, const std::vector<Strike>& limits,
+                         const BodySet& bodies, StepContacts& contacts) {
   bounces_.clear();
   biased_.clear();
   limits_.clear();
@@ -50,8 +67,7 @@ void Restitution::choose(const Impacts& chosen, const Impacts& forces,
   if (bounces_.empty() && limits_.empty()) return;
   before_ = bodies.motion;
   came_ = chosen.coming();
-  if (!forces.list().empty()) return add_of_forces(forces, force_);
-  force_ = before_;  // limits of joints are all that is struck
+  force_ = before_;
   subtract(force_, came_);
 }
 
@@ -69,9 +85,8 @@ void Restitution::add_laws(bool plastic, const BodySet& bodies,
 // An island gains the energy constant + linear s + square s^2 in the step, where s is the scale of
 // `change_` from the velocities in `bodies`. The gain is the kinetic energy less that of `came_`
 // and less the work of the forces. Their work is their impulse, which s changes for motors, times
-// the velocities that bodies move with; a later pass of a step subtracts the work that they would
-// do without it. Without restitution the gain is at most 0: -|M^-1 (f dt + J'x)|^2 / 2 in the
-// metric of the masses, and what friction takes.
+// the velocities that bodies move with. Without restitution the gain is at most 0:
+// -|M^-1 (f dt + J'x)|^2 / 2 in the metric of the masses, and what friction takes.
 void Restitution::sum_energies(const BodySet& bodies) {
   const std::size_t n = bodies.motion.size();
   for (std::vector<double>* sum : {&constant_, &linear_, &square_, &kinetic_}) sum->assign(n, 0);
@@ -79,11 +94,8 @@ void Restitution::sum_energies(const BodySet& bodies) {
     if (bodies.mass[i] == 0) continue;
     const RigidBody &is = bodies.motion[i], &was = came_[i], &d = change_[i], &f = force_[i];
     const std::size_t r = at(islands_.root(static_cast<int>(i)));
-    RigidBody counted = f;  // in earlier passes
-    counted.velocity -= before_[i].velocity - was.velocity;
-    counted.angular_velocity -= before_[i].angular_velocity - was.angular_velocity;
-    constant_[r] += kinetic_gain(bodies, i, is, was) - work(bodies, i, f, is) -
-                    work(bodies, i, driven_[i], is) + work(bodies, i, counted, before_[i]);
+    constant_[r] +=
+        kinetic_gain(bodies, i, is, was) - work(bodies, i, f, is) - work(bodies, i, driven_[i], is);
     linear_[r] += work(bodies, i, is, d) - work(bodies, i, f, d) - work(bodies, i, driven_[i], d) -
                   work(bodies, i, driven_change_[i], is);
     const double kinetic = 0.5 * work(bodies, i, d, d);

@@ -6,7 +6,6 @@
 
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
-#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 
@@ -26,10 +25,10 @@ class Restitution {
   /// Problems include the laws of joints.
   void set_laws(JointPart& joints) { laws_ = &joints; }
 
-  /// Selects the impacts that bounce. `chosen` has the velocities at the start; `forces` those
-  /// before and after the forces of the step; `limits` are the limits of joints that are struck.
-  void choose(const Impacts& chosen, const Impacts& forces, const std::vector<Strike>& limits,
-              const BodySet& bodies, StepContacts& contacts);
+  /// Selects the impacts that bounce. `chosen` has the velocities at the start, `bodies` those with
+  /// the forces of the step; `limits` are the limits of joints that are struck.
+  void choose(const Impacts& chosen, const std::vector<Strike>& limits, const BodySet& bodies,
+              StepContacts& contacts);
   /// After the solve. Changes velocities and impulses; returns the number of bounces.
   int apply(BodySet& bodies, StepContacts& contacts);
 

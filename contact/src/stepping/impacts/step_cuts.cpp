@@ -7,7 +7,7 @@
 #include <tether/linalg/index.hpp>
 
 #include "stepping/impacts/restitution.hpp"
-#include "stepping/step_contacts.hpp"
+#include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
 
@@ -40,23 +40,6 @@ double closing_time(double gap, double came, double more) {
   return 2 * gap / (came + std::sqrt(std::max(0.0, came * came + 4 * more * gap)));
 }
 
-void add_impulses(const StepContacts& part, StepContacts& sum) {
-  for (std::size_t k = 0; k < part.impulses.size(); ++k) {
-    if (part.impulses[k].isZero(0)) continue;
-    std::size_t j = 0;
-    while (j < sum.points.size() && sum.points[j].id != part.points[k].id) ++j;
-    if (j == sum.points.size()) {
-      sum.points.push_back(part.points[k]);
-      sum.gaps.push_back(part.gaps[k]);
-      sum.impulses.emplace_back(Eigen::Vector3d::Zero());
-    }
-    sum.impulses[j] += part.impulses[k];
-    if (k >= part.moments.size()) continue;
-    sum.moments.resize(sum.points.size(), Eigen::Vector3d::Zero());
-    sum.moments[j] += part.moments[k];
-  }
-}
-
 StepCuts::StepCuts(const BodyOptions& options, IslandMaker* maker)
     : islands_(maker), solver_(cold(options), maker, LawUse::none) {}
 
@@ -71,7 +54,7 @@ void StepCuts::find_islands(const NearContacts& near, const BodySet& bodies,
                             const StepContacts& contacts) {
   islands_.join(bodies, contacts);
   whole_.assign(bodies.motion.size(), 0);
-  if (laws_ != nullptr) islands_.mark(laws_->under_laws(), whole_);
+  if (laws_ != nullptr) islands_.mark(laws_->under_laws, whole_);
   size_.assign(bodies.motion.size(), 0);
   const bool rolling = near.any_rolling();
   for (const PointContact& c : contacts.points) {

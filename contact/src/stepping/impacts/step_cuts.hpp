@@ -9,7 +9,6 @@
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/motion/joint_part.hpp"
-#include "stepping/motion/moving_islands.hpp"
 #include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
@@ -29,10 +28,6 @@ struct Approach {
   double speed(double gap, double dt) const { return came + (comes - came) * time(gap, dt) / dt; }
 };
 
-/// Adds the impulses of `part` by identity: those of a step are sums over its sub-steps and
-/// impacts.
-void add_impulses(const StepContacts& part, StepContacts& sum);
-
 /// Cuts the step of striking islands (method, section 7.1): up to the first closing gap, the impact
 /// itself, which takes no time, and the rest. Without a cut an impact is taken at the start of its
 /// step. The positions then have an error of the step's length times the phase of the impact in the
@@ -40,7 +35,7 @@ void add_impulses(const StepContacts& part, StepContacts& sum);
 class StepCuts {
  public:
   /// Most contacts of a scene, or, in scenes of up to the second number, of a striking island.
-  static constexpr std::size_t kMostContacts = kFewContacts, kMostInScene = 512;
+  static constexpr std::size_t kMostContacts = 16, kMostInScene = 512;
   static constexpr int kMost = 32;  // in a step; then as without
   /// Budget of cuts with more than kMostContacts, in contact problems: income of a step, most that
   /// is kept, price of a cut, which is the first stock.

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "stepping/motion/joint_part.hpp"
-#include "stepping/motion/moving_islands.hpp"
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {

@@ -59,7 +59,7 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
   };
   const auto bend = [&](int body, const Vector3d& r) -> Vector3d {
     if (!held(body)) return Vector3d::Zero();
-    const Vector6d& v = joints->bend()[at(body)];
+    const Vector6d& v = joints->bend[at(body)];
     return v.head<3>() + v.tail<3>().cross(r);
   };
   then_.mass = bodies.mass;

@@ -6,7 +6,6 @@
 #include <tether/linalg/index.hpp>
 
 #include "stepping/detection/clip.hpp"
-#include "stepping/detection/collide.hpp"
 
 namespace tether::contact::detail {
 

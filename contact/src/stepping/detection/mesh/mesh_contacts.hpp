@@ -7,10 +7,8 @@
 #include <tether/contact/shapes.hpp>
 #include <vector>
 
-#include "stepping/detection/convex_shape.hpp"
-#include "stepping/detection/manifold.hpp"
+#include "stepping/detection/collide.hpp"
 #include "stepping/detection/mesh/triangle_mesh.hpp"
-#include "stepping/detection/mesh/triangle_tree.hpp"
 
 namespace tether::contact::detail {
 

@@ -1,5 +1,5 @@
 // Tether: points of a polyhedron over a face of another. SPDX-License-Identifier: BSD-3-Clause
-#include "stepping/detection/polyhedra/face_clipping.hpp"
+#include "stepping/detection/polyhedra/polyhedra.hpp"
 
 #include <algorithm>
 #include <limits>

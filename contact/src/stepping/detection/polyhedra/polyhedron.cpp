@@ -58,16 +58,19 @@ Polyhedron make_polyhedron(const Shape& shape) {
   return p;
 }
 
-void place(const Polyhedron& from, const Pose& pose, const Vector3d& origin, Polyhedron& to) {
+void place(const Polyhedron& from, const Pose& pose, const Vector3d& origin, Placed& to) {
+  to.shape = &from;
+  to.rotation = pose.rotation;
+  to.origin = origin;
   const Vector3d move = pose.position - origin;
-  to.size = from.size;
-  to.vertices.resize(from.vertices.size());
+  to.now.size = from.size;
+  to.now.vertices.resize(from.vertices.size());
   for (std::size_t k = 0; k < from.vertices.size(); ++k)
-    to.vertices[k] = move + pose.rotation * from.vertices[k];
-  to.faces.resize(from.faces.size());
+    to.now.vertices[k] = move + pose.rotation * from.vertices[k];
+  to.now.faces.resize(from.faces.size());
   for (std::size_t k = 0; k < from.faces.size(); ++k) {
-    to.faces[k].normal = pose.rotation * from.faces[k].normal;
-    to.faces[k].offset = from.faces[k].offset + to.faces[k].normal.dot(move);
+    to.now.faces[k].normal = pose.rotation * from.faces[k].normal;
+    to.now.faces[k].offset = from.faces[k].offset + to.now.faces[k].normal.dot(move);
   }
 }
 

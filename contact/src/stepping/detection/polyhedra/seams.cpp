@@ -7,7 +7,7 @@
 
 #include "stepping/detection/clip.hpp"
 #include "stepping/detection/polyhedra/polyhedra.hpp"
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact::detail {
 
@@ -155,8 +155,8 @@ bool cover(Polyhedron& a, const Pose& A, const Polyhedron& b, const Pose& B) {
   return any;
 }
 
-}  // namespace
-
+// Takes from the open pieces of each part of a body what other parts lie against, and marks the
+// edges beyond which these go on in the plane. Returns for each part those that touch its faces.
 std::vector<std::vector<int>> find_seams(std::vector<Polyhedron>& parts,
                                          const std::vector<Pose>& poses) {
   const std::vector<Polyhedron> whole = parts;
@@ -170,6 +170,7 @@ std::vector<std::vector<int>> find_seams(std::vector<Polyhedron>& parts,
   return touching;
 }
 
+// Whether b has the point x, and reaches above the plane through it across n.
 bool rises_above(const Polyhedron& b, const Pose& B, const Vector3d& x, const Vector3d& n) {
   const Vector3d p = B.rotation.transpose() * (x - B.position), m = B.rotation.transpose() * n;
   const double same = kTouch * extent(b);
@@ -179,6 +180,7 @@ bool rises_above(const Polyhedron& b, const Pose& B, const Vector3d& x, const Ve
                      [&](const Vector3d& v) { return m.dot(v - p) > kUpright * (v - p).norm(); });
 }
 
+// x, or where it is outside of `a` a point of `a` near to it.
 Vector3d into(const Polyhedron& a, const Pose& A, const Vector3d& x) {
   Vector3d p = A.rotation.transpose() * (x - A.position);
   for (const Polyhedron::Face& f : a.faces)
@@ -186,6 +188,7 @@ Vector3d into(const Polyhedron& a, const Pose& A, const Vector3d& x) {
   return A.position + A.rotation * p;
 }
 
+// Whether x lies on an open piece of a face of `a` whose normal is n, up to an angle in radian.
 bool is_on_open_piece(const Polyhedron& a, const Pose& A, const Vector3d& x, const Vector3d& n,
                       double angle) {
   const Vector3d p = A.rotation.transpose() * (x - A.position), m = A.rotation.transpose() * n;
@@ -196,6 +199,45 @@ bool is_on_open_piece(const Polyhedron& a, const Pose& A, const Vector3d& x, con
       if (is_within(corners_of(a, piece), f.normal, p, same)) return true;
   }
   return false;
+}
+
+}  // namespace
+
+bool Seam::at(const Vector3d& x, const Vector3d& n) const {
+  return parts->is_seam(part, x, n, kTie);
+}
+
+void Parts::join(const std::vector<int>& numbers, std::vector<Polyhedron> shapes,
+                 const std::vector<Pose>& on_body) {
+  const std::vector<std::vector<int>> beside = find_seams(shapes, on_body);
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    if (beside[i].empty()) continue;
+    touching.resize(polyhedron.size());
+    for (const int j : beside[i])
+      touching[linalg::at(numbers[i])].push_back(numbers[linalg::at(j)]);
+    polyhedron[linalg::at(numbers[i])] = std::move(shapes[i]);
+  }
+}
+
+bool Parts::is_seam(int k, const Vector3d& near, const Vector3d& n, double angle) const {
+  if (!has_seams(k)) return false;
+  const std::vector<int>& others = touching[linalg::at(k)];
+  const Polyhedron& a = polyhedron[linalg::at(k)];
+  const Pose& A = pose[linalg::at(k)];
+  // The point is beside an edge that a round shape overlaps.
+  const Vector3d x = into(a, A, near);
+  return std::any_of(others.begin(), others.end(),
+                     [&](int j) {
+                       return rises_above(polyhedron[linalg::at(j)], pose[linalg::at(j)], x, n);
+                     }) &&
+         !is_on_open_piece(a, A, x, n, angle);
+}
+
+bool Parts::goes_on(int k, const Vector3d& x, const Vector3d& n) const {
+  return has_seams(k) &&
+         std::any_of(touching[linalg::at(k)].begin(), touching[linalg::at(k)].end(), [&](int j) {
+           return is_on_open_piece(polyhedron[linalg::at(j)], pose[linalg::at(j)], x, n, kTie);
+         });
 }
 
 }  // namespace tether::contact::detail

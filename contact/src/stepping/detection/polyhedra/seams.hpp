@@ -8,20 +8,25 @@
 
 namespace tether::contact::detail {
 
-/// Takes from the open pieces of each part of a body what other parts lie against, and marks the
-/// edges beyond which these go on in the plane. Returns for each part those that touch its faces.
-std::vector<std::vector<int>> find_seams(std::vector<Polyhedron>& parts,
-                                         const std::vector<Pose>& poses);
+/// Surfaces, some of which are boxes and hulls that lie against others of their body.
+struct Parts {
+  std::vector<Polyhedron> polyhedron;      // of each surface; empty where none is needed
+  std::vector<Pose> pose;                  // of each surface
+  std::vector<std::vector<int>> touching;  // of each surface, or empty where no surface has any
 
-/// Whether b has the point x, and reaches above the plane through it across n.
-bool rises_above(const Polyhedron& b, const Pose& pose, const Eigen::Vector3d& x,
-                 const Eigen::Vector3d& n);
-
-/// Whether x lies on an open piece of a face of `a` whose normal is n, up to an angle in radian.
-bool is_on_open_piece(const Polyhedron& a, const Pose& pose, const Eigen::Vector3d& x,
-                      const Eigen::Vector3d& n, double angle);
-
-/// x, or where it is outside of `a` a point of `a` near to it.
-Eigen::Vector3d into(const Polyhedron& a, const Pose& pose, const Eigen::Vector3d& x);
+  /// The surfaces of these numbers, all boxes and hulls of one body and material: takes from their
+  /// open pieces what others lie against, and lists those. Poses are those on the body.
+  void join(const std::vector<int>& numbers, std::vector<Polyhedron> shapes,
+            const std::vector<Pose>& on_body);
+  bool has_seams(int surface) const {
+    return !touching.empty() && !touching[linalg::at(surface)].empty();
+  }
+  Seam seam(int surface) const { return has_seams(surface) ? Seam{this, surface} : Seam{}; }
+  /// Whether no contact has the point x and the outward normal n, up to an angle in radian: within
+  /// the body, or on a surface that goes on above the plane across n.
+  bool is_seam(int surface, const Eigen::Vector3d& x, const Eigen::Vector3d& n, double angle) const;
+  /// Whether a part beside this one has x on an open face with the normal n.
+  bool goes_on(int surface, const Eigen::Vector3d& x, const Eigen::Vector3d& n) const;
+};
 
 }  // namespace tether::contact::detail

@@ -1,6 +1,6 @@
 // Tether: boxes. SPDX-License-Identifier: BSD-3-Clause
 #include "stepping/detection/polyhedra/polyhedron.hpp"
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact {
 

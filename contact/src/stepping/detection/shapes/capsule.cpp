@@ -1,7 +1,7 @@
 // Tether: capsules. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact {
 

@@ -3,7 +3,7 @@
 #include <tether/linalg/convex_hull.hpp>
 
 #include "stepping/detection/polyhedra/polyhedron.hpp"
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact {
 

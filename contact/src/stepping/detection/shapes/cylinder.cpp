@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <tether/linalg/pi.hpp>
 
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact {
 

@@ -1,5 +1,5 @@
 // Tether: points that touch. SPDX-License-Identifier: BSD-3-Clause
-#include "stepping/detection/shape_parts.hpp"
+#include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact {
 
