@@ -26,45 +26,10 @@ tc::ConeProblem make_saddle(const py::object& M, const py::object& J, const Arra
                                  std::move(cones), entries("compliance", compliance));
 }
 
-View by_row(const char* argument, const Array& given, const tc::ConeProblem& problem) {
-  const View x = vector(argument, given);
-  if (x.size() != problem.rows())
-    refuse(std::string(argument) + " has " + std::to_string(x.size()) + " entries, must have " +
-           std::to_string(problem.rows()));
-  return x;
-}
-
 py::dict residuals_of(const tc::ConeResiduals& r) {
   using namespace py::literals;
   return py::dict("error"_a = r.error, "worst"_a = r.worst,
                   "blocks"_a = array(r.blocks.data(), static_cast<py::ssize_t>(r.blocks.size())));
-}
-
-tc::ConeSolution solve(const tc::ConeProblem& problem, const std::string& law, double tolerance,
-                       const py::object& start, double max_work) {
-  tc::Options options;
-  options.law = named<tc::Law>("law", law, tc::laws());
-  options.tolerance = tolerance;
-  options.max_work = max_work;
-  tc::ConeSolver solver(options);
-  if (start.is_none()) {
-    const py::gil_scoped_release others_run;
-    return solver.solve(problem);
-  }
-  const auto given = start.cast<Array>();
-  const View x = by_row("start", given, problem);
-  const py::gil_scoped_release others_run;
-  return solver.solve(problem, x);
-}
-
-tc::Derivative derivative(const tc::ConeProblem& problem, const Array& impulses, double tolerance,
-                          double kink) {
-  tc::DerivativeOptions options;
-  options.tolerance = tolerance;
-  options.kink = kink;
-  const View x = by_row("impulses", impulses, problem);
-  const py::gil_scoped_release others_run;
-  return tc::derivative(problem, x, options);
 }
 
 void bind_cone(py::module_& module) {
@@ -95,7 +60,7 @@ functions below.)")
 
 With torsional 6: normal, tangents, moment about the normal, two across it.)")
       .def_property_readonly(
-          "kind", [](const tc::Cone& c) { return std::string(name(c.kind)); },
+          "kind", word(&tc::Cone::kind),
           "the law: free, nonnegative, bounded, planar, friction, torsional, rolling or "
           "rolling_torsional")
       .def_readonly("rows", &tc::Cone::rows, "number of rows of x, w and b")
@@ -143,66 +108,36 @@ bias: (n,).)")
       .def(
           "residuals",
           [](const tc::ConeProblem& p, const Array& impulses, const std::string& law) {
-            return residuals_of(tc::evaluate(p, named<tc::Law>("law", law, tc::laws()),
-                                             by_row("impulses", impulses, p)));
+            return residuals_of(tc::evaluate(p, law_of(law), by_row("impulses", impulses, p)));
           },
           "impulses"_a, "law"_a = "coulomb",
           R"(How far any impulses are from the law, without units: a dict.
 
 blocks: error in velocity of each cone, over what its island needs; error: the largest; worst: the
 cone that has it.)")
-      .def("derivative", &derivative, "impulses"_a, py::kw_only(), "tolerance"_a = 1e-5,
-           "kink"_a = 1e-6,
-           R"(The derivative of the solution `impulses` under "coulomb": a Derivative.
+      .def(
+          "derivative",
+          [](const tc::ConeProblem& p, const Array& impulses, double tolerance, double kink) {
+            return derivative_of(tolerance, kink, p, by_row("impulses", impulses, p));
+          },
+          "impulses"_a, py::kw_only(), "tolerance"_a = 1e-5, "kink"_a = 1e-6,
+          R"(The derivative of the solution `impulses` under "coulomb": a Derivative.
 
 tolerance: largest error of a solution that is taken; kink: cones nearer to another regime than
 this (relative) are listed. Raises ValueError where the impulses are no solution.)")
-      .def("solve", &solve, "law"_a = "coulomb", py::kw_only(), "tolerance"_a = 1e-9,
-           "start"_a = py::none(), "max_work"_a = 1e10,
-           R"(The impulses that obey the law: a ConeSolution.
+      .def(
+          "solve",
+          [](const tc::ConeProblem& p, const std::string& law, double tolerance,
+             const py::object& start, double max_work) {
+            return solve<tc::ConeSolver>(p, law, tolerance, start, max_work, false);
+          },
+          "law"_a = "coulomb", py::kw_only(), "tolerance"_a = 1e-9, "start"_a = py::none(),
+          "max_work"_a = 1e10,
+          R"(The impulses that obey the law: a ConeSolution.
 
 law: coulomb takes every cone, frictionless no bounds and moments, maximum_dissipation no free rows
 either. start: impulses to begin with. max_work: about nanoseconds. What cannot be solved is a
 status, with advice.)");
-}
-
-void bind_solution(py::module_& module) {
-  py::class_<tc::ConeSolution>(module, "ConeSolution", "An answer and how good it is.")
-      .def_property_readonly(
-          "solved", [](const tc::ConeSolution& s) { return s.status == tc::Status::solved; },
-          "whether the error is within the tolerance")
-      .def_property_readonly(
-          "status", [](const tc::ConeSolution& s) { return std::string(name(s.status)); },
-          "solved, unsolved, stalled, cycling, work_limit, round_off or infeasible")
-      .def_property_readonly(
-          "impulses", [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.impulses); },
-          "x, (n,), by row")
-      .def_property_readonly(
-          "velocities", [](const tc::ConeSolution& s) { return Eigen::VectorXd(s.velocities); },
-          "w = A x - b, (n,)")
-      .def_property_readonly(
-          "residuals", [](const tc::ConeSolution& s) { return residuals_of(s.residuals); },
-          "of the impulses, as ConeProblem.residuals gives them")
-      .def_readonly("error", &tc::ConeSolution::error,
-                    "residuals[\"error\"], which is compared with the tolerance")
-      .def_readonly("contradicting", &tc::ConeSolution::contradicting,
-                    "free rows that nothing satisfies together")
-      .def_readonly("blocked", &tc::ConeSolution::blocked,
-                    "cones that approach though free rows hold their normal")
-      .def_property_readonly(
-          "infeasible_direction",
-          [](const tc::ConeSolution& s) {
-            return array(s.infeasible_direction.data(),
-                         static_cast<py::ssize_t>(s.infeasible_direction.size()));
-          },
-          "(n,) d that proves infeasibility: A d = 0 and b.d > 0; else empty")
-      .def_readonly("advice", &tc::ConeSolution::advice, "what to try when it is not solved")
-      .def_property_readonly(
-          "work", [](const tc::ConeSolution& s) { return s.counts.work; },
-          "estimated nanoseconds, counted from operations")
-      .def("__repr__", [](const tc::ConeSolution& s) {
-        return "<ConeSolution: " + std::string(name(s.status)) + ", error " + shown(s.error) + ">";
-      });
 }
 
 }  // namespace
@@ -210,8 +145,16 @@ void bind_solution(py::module_& module) {
 void bind_cones(py::module_& module) {
   bind_cone(module);
   bind_problem(module);
-  bind_solution(module);
   using namespace py::literals;
+  bind_solution<tc::ConeSolution>(module, "ConeSolution",
+                                  "residuals[\"error\"], which is compared with the tolerance")
+      .def_property_readonly(
+          "residuals", [](const tc::ConeSolution& s) { return residuals_of(s.residuals); },
+          "of the impulses, as ConeProblem.residuals gives them")
+      .def_readonly("contradicting", &tc::ConeSolution::contradicting,
+                    "free rows that nothing satisfies together")
+      .def_readonly("blocked", &tc::ConeSolution::blocked,
+                    "cones that approach though free rows hold their normal");
   module.def("read_cones", &tc::read_cones, "path"_a,
              "A ConeProblem from a .dat of Siconos or an fclib file: with joints, rolling friction "
              "or in global form (M, H), too.");

@@ -23,25 +23,14 @@ using Columns = py::array_t<double, py::array::f_style | py::array::forcecast>;
 /// The entries of a scipy.sparse matrix, in 2 x 2 or 3 x 3 blocks.
 tc::Problem sparse(const py::object& A, const Array& b, const Array& mu) {
   const int d = dimension(b, mu);
-  const py::object entries = A.attr("tocoo")();
-  const auto size = entries.attr("shape").cast<std::array<py::ssize_t, 2>>();
-  if (size[0] != b.size() || size[1] != b.size())
-    refuse("A is " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + ", must be " +
-           std::to_string(b.size()) + " x " + std::to_string(b.size()) + " as b is long");
-  const auto rows = entries.attr("row").cast<py::array_t<long, py::array::forcecast>>();
-  const auto columns = entries.attr("col").cast<py::array_t<long, py::array::forcecast>>();
-  const auto values = entries.attr("data").cast<Array>();
   std::map<std::pair<int, int>, tc::MatrixBlock> blocks;
-  for (py::ssize_t k = 0; k < values.size(); ++k) {
-    const long i = rows.at(k), j = columns.at(k);
-    const int row = static_cast<int>(i / d), column = static_cast<int>(j / d);
-    tc::MatrixBlock& block = blocks[{row, column}];
-    block.row = row;
-    block.column = column;
-    block.value(i % d, j % d) += values.at(k);
+  for (const tc::MatrixEntry& each : matrix_entries("A", A, b.size(), b.size())) {
+    tc::MatrixBlock& block = blocks[{each.row / d, each.column / d}];
+    block.row = each.row / d;
+    block.column = each.column / d;
+    block.value(each.row % d, each.column % d) += each.value;
   }
   std::vector<tc::MatrixBlock> list;
-  list.reserve(blocks.size());
   for (const auto& [place, block] : blocks) list.push_back(block);
   return tc::Problem::sparse(d, std::move(list), vector("b", b), vector("mu", mu));
 }
@@ -55,13 +44,9 @@ tc::Problem make_problem(const py::object& A, const Array& b, const Array& mu) {
       vector("b", b), vector("mu", mu));
 }
 
-py::dict residuals(const tc::Problem& problem, const std::string& law, const Array& impulses) {
-  const View x = vector("impulses", impulses);
-  if (x.size() != problem.b().size())
-    refuse("impulses has " + std::to_string(x.size()) + " entries, must have " +
-           std::to_string(problem.b().size()));
-  const tc::Residuals r = tc::evaluate(problem, named<tc::Law>("law", law, tc::laws()), x);
+py::dict residuals(const tc::Problem& problem, const Array& impulses, const std::string& law) {
   using namespace py::literals;
+  const tc::Residuals r = tc::evaluate(problem, law_of(law), by_row("impulses", impulses, problem));
   return py::dict("signorini"_a = r.signorini, "cone"_a = r.cone, "alignment"_a = r.alignment,
                   "dissipation"_a = r.dissipation, "energy_change"_a = r.energy_change,
                   "fixed_point"_a = r.fixed_point, "natural_map"_a = r.natural_map);
@@ -78,37 +63,6 @@ py::dict prove(const tc::Problem& problem, const Array& impulses, double allowed
                   "relative_radius"_a = p.relative_radius, "change"_a = p.change,
                   "relative_change"_a = p.relative_change, "regimes"_a = words_of(p.regimes),
                   "contact"_a = p.contact, "reason"_a = p.reason);
-}
-
-tc::Solution solve(const tc::Problem& problem, const std::string& law, double tolerance,
-                   const py::object& start, double max_work, bool strict) {
-  tc::Options options;
-  options.law = named<tc::Law>("law", law, tc::laws());
-  options.tolerance = tolerance;
-  options.max_work = max_work;
-  options.strict = strict;
-  tc::Solver solver(options);
-  if (start.is_none()) {
-    const py::gil_scoped_release others_run;
-    return solver.solve(problem);
-  }
-  const auto given = start.cast<Array>();
-  const View x = vector("start", given);
-  if (x.size() != problem.b().size())
-    refuse("start has " + std::to_string(x.size()) + " entries, must have " +
-           std::to_string(problem.b().size()));
-  const py::gil_scoped_release others_run;
-  return solver.solve(problem, x);
-}
-
-tc::Derivative derivative(const tc::Problem& problem, const tc::Solution& solution,
-                          const std::string& law, double tolerance, double kink) {
-  tc::DerivativeOptions options;
-  options.tolerance = tolerance;
-  options.kink = kink;
-  const tc::Law known = named<tc::Law>("law", law, tc::laws());
-  const py::gil_scoped_release others_run;
-  return tc::derivative(problem, known, solution, options);
 }
 
 }  // namespace
@@ -139,73 +93,46 @@ w = A x - b. Raises ValueError on sizes that do not match and values that are no
             return mu;
           },
           "(n,), coefficients of friction")
-      .def(
-          "residuals",
-          [](const tc::Problem& p, const Array& impulses, const std::string& law) {
-            return residuals(p, law, impulses);
-          },
-          "impulses"_a, "law"_a = "maximum_dissipation",
-          "How far any impulses are from a solution: velocities in m/s; fixed_point has no unit.")
+      .def("residuals", &residuals, "impulses"_a, "law"_a = "maximum_dissipation",
+           "How far any impulses are from a solution: velocities in m/s; fixed_point has no unit.")
       .def("prove", &prove, "impulses"_a, py::kw_only(), "allowed"_a = 1e-9,
            R"(Proof in interval arithmetic that an exact solution of Coulomb's law is near.
 
 status: proven (every |x*_i - x_i| <= radius, N s), proven_nearby (the same, x* solves a problem
 whose b differs by at most change in m/s; relative_change, at most `allowed`, is over the largest b
 of its island) or not_proven. contact and reason: what prevents more.)")
-      .def("derivative", &derivative, "solution"_a, "law"_a = "maximum_dissipation", py::kw_only(),
-           "tolerance"_a = 1e-5, "kink"_a = 1e-6,
-           R"(The derivative of a Solution of this problem under `law`: a Derivative.
+      .def(
+          "derivative",
+          [](const tc::Problem& p, const tc::Solution& solution, const std::string& law,
+             double tolerance,
+             double kink) { return derivative_of(tolerance, kink, p, law_of(law), solution); },
+          "solution"_a, "law"_a = "maximum_dissipation", py::kw_only(), "tolerance"_a = 1e-5,
+          "kink"_a = 1e-6,
+          R"(The derivative of a Solution of this problem under `law`: a Derivative.
 
 tolerance: largest error of a solution that is taken; kink: contacts nearer to another regime than
 this (relative) are listed. Raises ValueError where the impulses are no solution.)")
-      .def("solve", &solve, "law"_a = "maximum_dissipation", py::kw_only(), "tolerance"_a = 1e-9,
-           "start"_a = py::none(), "max_work"_a = 1e10, "strict"_a = false,
+      .def("solve", &solve<tc::Solver, tc::Problem>, "law"_a = "maximum_dissipation", py::kw_only(),
+           "tolerance"_a = 1e-9, "start"_a = py::none(), "max_work"_a = 1e10, "strict"_a = false,
            R"(The impulses that obey the law: a Solution.
 
 law: maximum_dissipation (Preclik and Ruede), coulomb or frictionless. tolerance: of the relative
 error in velocity. start: impulses to begin with. max_work: about nanoseconds. strict: never
 replace the law at single contacts. What cannot be solved is a status, with advice.)");
 
-  py::class_<tc::Solution>(module, "Solution", "An answer and how good it is.")
-      .def_property_readonly(
-          "solved", [](const tc::Solution& s) { return s.status == tc::Status::solved; },
-          "whether the error is within the tolerance")
-      .def_property_readonly(
-          "status", [](const tc::Solution& s) { return std::string(name(s.status)); },
-          "solved, unsolved, stalled, cycling, work_limit, round_off or infeasible")
-      .def_property_readonly(
-          "impulses", [](const tc::Solution& s) { return Eigen::VectorXd(s.impulses); },
-          "x, (d n,): normal, tangents of each contact, N s")
-      .def_property_readonly(
-          "velocities", [](const tc::Solution& s) { return Eigen::VectorXd(s.velocities); },
-          "w = A x - b, (d n,), m/s")
+  bind_solution<tc::Solution>(module, "Solution",
+                              "residuals[\"fixed_point\"], which is compared with the tolerance")
       .def_property_readonly(
           "regimes", [](const tc::Solution& s) { return words_of(s.regimes); },
           "separating, sticking or sliding")
-      .def_readonly("error", &tc::Solution::error,
-                    "residuals[\"fixed_point\"], which is compared with the tolerance")
-      .def_readonly("advice", &tc::Solution::advice, "what to try when it is not solved")
       .def_readonly("replaced", &tc::Solution::replaced,
                     "contacts with Coulomb's law instead of maximum_dissipation")
-      .def_property_readonly(
-          "infeasible_direction",
-          [](const tc::Solution& s) {
-            return array(s.infeasible_direction.data(),
-                         static_cast<py::ssize_t>(s.infeasible_direction.size()));
-          },
-          "(d n,) d that proves infeasibility: A d = 0 and b.d > 0; else empty")
-      .def_property_readonly(
-          "work", [](const tc::Solution& s) { return s.counts.work; },
-          "estimated nanoseconds, counted from operations")
       .def_property_readonly(
           "sweeps", [](const tc::Solution& s) { return s.counts.sweeps; },
           "sweeps over all contacts")
       .def_property_readonly(
           "factorisations", [](const tc::Solution& s) { return s.counts.factorisations; },
-          "factorisations of sparse matrices")
-      .def("__repr__", [](const tc::Solution& s) {
-        return "<Solution: " + std::string(name(s.status)) + ", error " + shown(s.error) + ">";
-      });
+          "factorisations of sparse matrices");
 
   bind_derivative(module);
   bind_cones(module);

@@ -1,10 +1,11 @@
 // Tether: derivatives of solutions of contact problems for Python. SPDX-License-Identifier:
 // BSD-3-Clause
+#include <functional>
+
 #include "contact_parts.hpp"
 
 namespace tether::python {
 
-/// Entries of an array or a scipy.sparse matrix with `rows` rows and `columns` columns.
 Entries matrix_entries(const char* argument, const py::object& whole, py::ssize_t rows,
                        py::ssize_t columns) {
   const auto check = [&](py::ssize_t r, py::ssize_t c) {
@@ -94,42 +95,34 @@ hyperstatic problem: the solution then jumps.)")
 
 b by row; mu, rolling, torsional and bound by contact or cone; of the entries of A values[k] at
 rows[k], columns[k].)");
-  made.def_property_readonly(
-          "status", [](const tc::Derivative& d) { return std::string(name(d.report().status)); },
-          "unique, or minimum_norm: impulses are not unique, the least change is given")
-      .def_property_readonly(
-          "strictly_regular", [](const tc::Derivative& d) { return d.report().strictly_regular; },
-          "every contact is strictly open, sticking or sliding")
-      .def_property_readonly(
-          "regimes", [](const tc::Derivative& d) { return words_of(d.report().regimes); },
-          "separating, sticking or sliding: the branch of each contact")
-      .def_property_readonly(
-          "kinks",
-          [](const tc::Derivative& d) {
-            py::list out;
-            for (const tc::Kink& k : d.report().kinks)
-              out.append(py::make_tuple(k.contact, name(k.branch), name(k.other), k.margin));
-            return out;
-          },
-          "(contact, branch whose derivative is given, other regime, relative margin)")
-      .def_property_readonly(
-          "rank", [](const tc::Derivative& d) { return d.report().rank; },
-          "how many of `unknowns` are determined")
-      .def_property_readonly(
-          "unknowns", [](const tc::Derivative& d) { return d.report().unknowns; },
-          "components of touching contacts")
-      .def_property_readonly(
-          "not_unique", [](const tc::Derivative& d) { return d.report().not_unique; },
-          "contacts whose impulses are not determined")
-      .def_property_readonly(
-          "velocities_unique", [](const tc::Derivative& d) { return d.report().velocities_unique; },
-          "velocities are determined even where impulses are not")
-      .def_property_readonly(
-          "error", [](const tc::Derivative& d) { return d.report().error; },
-          "relative error of the impulses as a solution")
-      .def_property_readonly(
-          "advice", [](const tc::Derivative& d) { return d.report().advice; },
-          "what the report means for the use of the derivative");
+  const auto told = [&](const char* title, auto get, const char* what) {
+    made.def_property_readonly(
+        title, [get](const tc::Derivative& d) { return std::invoke(get, d.report()); }, what);
+  };
+  using Report = tc::DerivativeReport;
+  told("status", word(&Report::status),
+       "unique, or minimum_norm: impulses are not unique, the least change is given");
+  told("strictly_regular", &Report::strictly_regular,
+       "every contact is strictly open, sticking or sliding");
+  told(
+      "regimes", [](const Report& r) { return words_of(r.regimes); },
+      "separating, sticking or sliding: the branch of each contact");
+  told(
+      "kinks",
+      [](const Report& r) {
+        py::list out;
+        for (const tc::Kink& k : r.kinks)
+          out.append(py::make_tuple(k.contact, name(k.branch), name(k.other), k.margin));
+        return out;
+      },
+      "(contact, branch whose derivative is given, other regime, relative margin)");
+  told("rank", &Report::rank, "how many of `unknowns` are determined");
+  told("unknowns", &Report::unknowns, "components of touching contacts");
+  told("not_unique", &Report::not_unique, "contacts whose impulses are not determined");
+  told("velocities_unique", &Report::velocities_unique,
+       "velocities are determined even where impulses are not");
+  told("error", &Report::error, "relative error of the impulses as a solution");
+  told("advice", &Report::advice, "what the report means for the use of the derivative");
 }
 
 }  // namespace tether::python

@@ -3,34 +3,19 @@
 #include <exception>
 #include <functional>
 #include <ida/ida.h>
-#include <memory>
-#include <nvector/nvector_serial.h>
 #include <optional>
 #include <pybind11/stl.h>
-#include <sstream>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
-#include <tether/ida_projection.hpp>
 
 #include "bind.hpp"
-#include "sundials/quiet_context.hpp"
+#include "sundials/ida_session.hpp"
 
 namespace tether::python {
 
 namespace {
 
 namespace tp = tether::ida_projection;
-
-struct FreeVector {
-  void operator()(N_Vector v) const { N_VDestroy(v); }
-};
-using OwnedVector = std::unique_ptr<std::remove_pointer_t<N_Vector>, FreeVector>;
-struct FreeMatrix {
-  void operator()(SUNMatrix A) const { SUNMatDestroy(A); }
-};
-struct FreeSolver {
-  void operator()(SUNLinearSolver s) const { SUNLinSolFree(s); }
-};
 
 Array vector(const char* argument, const py::object& given, py::ssize_t n) {
   const auto a = numbers(argument, given);
@@ -128,9 +113,9 @@ tp::Constraints constraints(System& system, const py::object& g, const py::objec
 /// IDA for one system, with everything that SUNDIALS wants to be freed.
 struct Ida {
   scene::QuietContext context;
-  OwnedVector y, yp, id, atol;
-  std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix> matrix;
-  std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver> solver;
+  scene::OwnedVector y, yp, id, atol;
+  scene::OwnedMatrix matrix;
+  scene::OwnedLinearSolver solver;
   struct Memory {
     void* ida = nullptr;
     ~Memory() {
@@ -138,8 +123,8 @@ struct Ida {
     }
   } memory;
 
-  OwnedVector vector(const Array& values) {
-    OwnedVector v(N_VNew_Serial(values.size(), context));
+  scene::OwnedVector vector(const Array& values) {
+    scene::OwnedVector v(N_VNew_Serial(values.size(), context));
     if (!v) throw std::bad_alloc();
     std::copy(values.data(), values.data() + values.size(), N_VGetArrayPointer(v.get()));
     return v;

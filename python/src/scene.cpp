@@ -46,12 +46,10 @@ struct Film {
     for (std::size_t i = events.size(); i < all.size(); ++i) events.push_back(all[i]);
   }
 
-  Array of_bodies(const std::vector<double>& values, py::ssize_t components) const {
-    return array(values, {static_cast<py::ssize_t>(t.size()),
-                          static_cast<py::ssize_t>(bodies.size()), components});
-  }
-  static Array of_records(const std::vector<double>& values) {
-    return array(values, {static_cast<py::ssize_t>(values.size())});
+  Array of(const std::vector<double>& values, py::ssize_t components) const {
+    const auto records = static_cast<py::ssize_t>(t.size());
+    if (components == 0) return array(values, {records});
+    return array(values, {records, static_cast<py::ssize_t>(bodies.size()), components});
   }
 };
 
@@ -106,39 +104,29 @@ void bind_scene(py::module_& module) {
   using namespace py::literals;
   module.doc() = "Rigid bodies in motion, from scene files. SI units, world axes.";
 
-  py::class_<Film>(module, "Run", R"(The records of a run.
+  py::class_<Film> film(module, "Run", R"(The records of a run.
 
 t: (T,); position, velocity, angular_velocity: (T, bodies, 3); orientation: (T, bodies, 4) as
-w, x, y, z; energy, drift, penetration, residual, contacts: (T,).)")
-      .def_readonly("bodies", &Film::bodies, "their names, in the order of the arrays")
-      .def_property_readonly(
-          "t", [](const Film& f) { return f.of_records(f.t); }, "times of the records, (T,), s")
-      .def_property_readonly(
-          "position", [](const Film& f) { return f.of_bodies(f.position, 3); },
-          "of centres of mass, (T, bodies, 3), m")
-      .def_property_readonly(
-          "orientation", [](const Film& f) { return f.of_bodies(f.orientation, 4); },
-          "body to world, (T, bodies, 4): w, x, y, z")
-      .def_property_readonly(
-          "velocity", [](const Film& f) { return f.of_bodies(f.velocity, 3); },
-          "of centres of mass, (T, bodies, 3), m/s")
-      .def_property_readonly(
-          "angular_velocity", [](const Film& f) { return f.of_bodies(f.angular_velocity, 3); },
-          "(T, bodies, 3), rad/s")
-      .def_property_readonly(
-          "energy", [](const Film& f) { return f.of_records(f.energy); },
-          "kinetic and potential, (T,), J")
-      .def_property_readonly(
-          "drift", [](const Film& f) { return f.of_records(f.drift); },
-          "largest violation of a joint, (T,), m or rad")
-      .def_property_readonly(
-          "penetration", [](const Film& f) { return f.of_records(f.penetration); },
-          "the deepest, (T,), m")
-      .def_property_readonly(
-          "residual", [](const Film& f) { return f.of_records(f.residual); },
-          "of the last contact problem, (T,)")
-      .def_property_readonly(
-          "contacts", [](const Film& f) { return f.of_records(f.contacts); }, "their number, (T,)")
+w, x, y, z; energy, drift, penetration, residual, contacts: (T,).)");
+  struct Series {
+    const char *name, *what;
+    std::vector<double> Film::*values;
+    py::ssize_t of_body;  // components; 0: one number a record
+  };
+  for (const Series& each :
+       {Series{"t", "times of the records, (T,), s", &Film::t, 0},
+        {"position", "of centres of mass, (T, bodies, 3), m", &Film::position, 3},
+        {"orientation", "body to world, (T, bodies, 4): w, x, y, z", &Film::orientation, 4},
+        {"velocity", "of centres of mass, (T, bodies, 3), m/s", &Film::velocity, 3},
+        {"angular_velocity", "(T, bodies, 3), rad/s", &Film::angular_velocity, 3},
+        {"energy", "kinetic and potential, (T,), J", &Film::energy, 0},
+        {"drift", "largest violation of a joint, (T,), m or rad", &Film::drift, 0},
+        {"penetration", "the deepest, (T,), m", &Film::penetration, 0},
+        {"residual", "of the last contact problem, (T,)", &Film::residual, 0},
+        {"contacts", "their number, (T,)", &Film::contacts, 0}})
+    film.def_property_readonly(
+        each.name, [each](const Film& f) { return f.of(f.*each.values, each.of_body); }, each.what);
+  film.def_readonly("bodies", &Film::bodies, "their names, in the order of the arrays")
       .def_property_readonly("events", &events, "Of the event engine, in order of time.")
       .def_property_readonly(
           "engine", [](const Film& f) { return f.result.engine; }, "smooth, stepping or event")

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "output/thinned.hpp"
-#include "picture/axes.hpp"
 #include "picture/canvas.hpp"
 #include "run_files.hpp"
 #include "support/catch.hpp"

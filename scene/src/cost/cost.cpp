@@ -119,7 +119,7 @@ CostRow measure_row(const Scene& scene, Setting setting, const std::vector<doubl
   const RunResult& r = m.result;
   row.failure = r.failure;
   // On the safe side: the error of the reference may add to the difference found.
-  row.error = distance(m.samples, reference.samples) + reference.error;
+  row.error = distance(m.samples, reference.samples, m.samples.times) + reference.error;
   row.drift = r.summary.drift;
   row.penetration = r.summary.penetration;
   row.steps = r.counts.steps;
@@ -193,7 +193,7 @@ CostTable cost(const Scene& scene, const CostOptions& options) {
     table.reference = reference.what;
     table.reference_error = reference.error;
     table.reference_setting = options.reference;
-    if (plan.engine == EngineKind::stepping && !(events && reference.of_events))
+    if (plan.engine == EngineKind::stepping && !(events && reference.by == CostMethod::events))
       table.reference_setting = options.reference.value_or(finest_step / 4);
     for (const Setting& each : settings) {
       tell(fmt::format("{} {:g}", name(each.method), each.value));

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <tether/scene/cost.hpp>
 
-#include "picture/axes.hpp"
+#include "picture/canvas.hpp"
 #include "player/page_text.hpp"
 
 namespace tether::scene {

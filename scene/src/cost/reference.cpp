@@ -24,20 +24,26 @@ Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q
 
 constexpr int kReferenceSteps = 20000;  // between two stops; then it is given up
 
-/// Plain IDA in the form that differentiates everything, which drifts least at tight tolerances.
-Scene plain(const Scene& scene, double tolerance) {
-  Scene out = with_setting(scene, CostMethod::smooth, tolerance);
-  out.smooth->projection = false;
-  out.smooth->formulation = Formulation::index0;
-  for (Invariant& each : out.invariants) each.project = false;
-  out.smooth->max_steps = std::min(out.smooth->max_steps, kReferenceSteps);
-  return out;
-}
-
 Scene projected(const Scene& scene, double tolerance) {
   Scene out = with_setting(scene, CostMethod::smooth, tolerance);
   out.smooth->max_steps = std::min(out.smooth->max_steps, kReferenceSteps);
   return out;
+}
+
+/// Plain IDA in the form that differentiates everything, which drifts least at tight tolerances.
+Scene plain(const Scene& scene, double tolerance) {
+  Scene out = projected(scene, tolerance);
+  out.smooth->projection = false;
+  out.smooth->formulation = Formulation::index0;
+  for (Invariant& each : out.invariants) each.project = false;
+  return out;
+}
+
+/// The place of a time among times; their number: it is none of them.
+std::size_t place_of(double time, const std::vector<double>& times) {
+  const auto at = std::lower_bound(times.begin(), times.end(), time * (1 - kTimeRounding));
+  const bool there = at != times.end() && *at <= time * (1 + kTimeRounding);
+  return static_cast<std::size_t>((there ? at : times.end()) - times.begin());
 }
 
 /// The tightest run that gets through, and by how much the next looser one differs from it.
@@ -51,7 +57,7 @@ std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Sce
     const Measured m = measure_once(make(scene, tolerance), times.all, options);
     if (!m.result.failure.empty()) continue;
     if (best) {
-      best->error = distance(picked(best->samples, times.own), m.samples);
+      best->error = distance(best->samples, m.samples, times.own);
       return best;
     }
     best = Reference{m.samples, fmt::format("{}, tolerance {:g}", name, tolerance), 0,
@@ -102,33 +108,12 @@ Measured measure_once(const Scene& scene, const std::vector<double>& times,
   return out;
 }
 
-Samples picked(const Samples& all, const std::vector<double>& times) {
-  Samples out;
-  if (all.times.empty()) return out;
-  const std::size_t bodies = all.positions.size() / all.times.size();
-  std::size_t j = 0;
-  for (std::size_t i = 0; i < all.times.size(); ++i) {
-    while (j < times.size() && times[j] < all.times[i] * (1 - kTimeRounding)) ++j;
-    if (j == times.size()) break;
-    if (times[j] > all.times[i] * (1 + kTimeRounding)) continue;
-    out.times.push_back(all.times[i]);
-    for (std::size_t k = i * bodies; k < (i + 1) * bodies; ++k) {
-      out.positions.push_back(all.positions[k]);
-      out.orientations.push_back(all.orientations[k]);
-    }
-  }
-  return out;
-}
-
-double distance(const Samples& a, const Samples& b) {
+double distance(const Samples& a, const Samples& b, const std::vector<double>& times) {
   double largest = 0;
-  if (a.times.empty() || b.times.empty()) return largest;
-  const std::size_t bodies = a.positions.size() / a.times.size();
-  std::size_t j = 0;
+  const std::size_t bodies = a.times.empty() ? 0 : a.positions.size() / a.times.size();
   for (std::size_t i = 0; i < a.times.size(); ++i) {
-    while (j < b.times.size() && b.times[j] < a.times[i] * (1 - kTimeRounding)) ++j;
-    if (j == b.times.size()) break;
-    if (b.times[j] > a.times[i] * (1 + kTimeRounding)) continue;
+    const std::size_t j = place_of(a.times[i], b.times);
+    if (j == b.times.size() || place_of(a.times[i], times) == times.size()) continue;
     for (std::size_t k = 0; k < bodies; ++k) {
       const std::size_t m = i * bodies + k, n = j * bodies + k;
       largest = std::max(largest, (a.positions[m] - b.positions[n]).norm());
@@ -210,7 +195,7 @@ Reference smooth_reference(const Scene& scene, double tolerance, const Times& ti
     only.what += own ? " (plain IDA fails)" : "";
     return only;
   }
-  const double apart = distance(picked(own->samples, times.own), other->samples);
+  const double apart = distance(own->samples, other->samples, times.own);
   const bool take_own = 10 * own->error < other->error;
   Reference out = take_own ? *own : *other;
   const Reference& witness = take_own ? *other : *own;
@@ -240,22 +225,14 @@ Reference stepping_reference(const Scene& scene, double step, const Times& times
   std::vector<Samples> limits;
   for (std::size_t k = 0; k + 1 < runs.size(); ++k)
     limits.push_back(extrapolated(runs[k], runs[k + 1]));
-  const auto apart = [&](const Samples& a, const Samples& b) {
-    return distance(picked(a, times.own), b);
-  };
+  const auto apart = [&](const Samples& a, const Samples& b) { return distance(a, b, times.own); };
   const double of_run = 1.5 * std::max(apart(runs[0], runs[1]), apart(runs[1], runs[2]) / 2);
   const double of_limit = std::max(apart(limits[0], limits[1]), apart(limits[1], limits[2]) / 2);
-  Reference out;
-  if (of_limit < of_run) {
-    out.samples = limits[0];
-    out.error = of_limit;
-    out.what = fmt::format("the limit of the scene at steps of {:g} and {:g} s", step, 2 * step);
-  } else {
-    out.samples = runs[0];
-    out.error = of_run;
-    out.what = fmt::format("the scene at a step of {:g} s", step);
-  }
-  return out;
+  if (of_limit < of_run)
+    return {limits[0],
+            fmt::format("the limit of the scene at steps of {:g} and {:g} s", step, 2 * step),
+            of_limit};
+  return {runs[0], fmt::format("the scene at a step of {:g} s", step), of_run};
 }
 
 /// The event engine at a tight tolerance, and how far a looser one is from it.
@@ -268,12 +245,9 @@ std::optional<Reference> event_reference(const Scene& scene, double tolerance, c
     };
     const Measured tight = run(of_tight), loose = run(10 * of_tight);
     if (!tight.result.failure.empty() || !loose.result.failure.empty()) continue;
-    Reference out;
-    out.samples = tight.samples;
-    out.error = distance(picked(tight.samples, times.own), loose.samples);
-    out.of_events = true;
-    out.what = fmt::format("the scene's events at a tolerance of {:g}", of_tight);
-    return out;
+    return Reference{tight.samples,
+                     fmt::format("the scene's events at a tolerance of {:g}", of_tight),
+                     distance(tight.samples, loose.samples, times.own), 0, CostMethod::events};
   }
   return std::nullopt;
 }

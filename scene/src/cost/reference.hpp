@@ -24,11 +24,8 @@ struct Interrupted {};
 Measured measure_once(const Scene& scene, const std::vector<double>& times,
                       const CostOptions& options);
 
-/// At those of the times that it has.
-Samples picked(const Samples& all, const std::vector<double>& times);
-
-/// The largest distance (m) and angle (rad) at the times of `a` that `b` has, too.
-double distance(const Samples& a, const Samples& b);
+/// The largest distance (m) and angle (rad) at those of the times that both have.
+double distance(const Samples& a, const Samples& b, const std::vector<double>& times);
 
 /// So many equal times.
 std::vector<double> equal_times(double end, int count);
@@ -55,7 +52,7 @@ struct Reference {
   std::string what;
   double error = 0;  // what it may be off
   double drift = 0;  // how far it left the joints
-  bool of_events = false;
+  CostMethod by = CostMethod::smooth;
 };
 
 /// At the times. Each throws std::runtime_error where there is none.

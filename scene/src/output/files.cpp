@@ -30,36 +30,22 @@ namespace {
 
 constexpr int kNew = O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC;
 
-void write_all(const Open& out, const std::string& file, std::string_view content, bool lasting) {
-  if (out.descriptor < 0) fail(file);
-  while (!content.empty()) {
-    const ssize_t written = write(out.descriptor, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail(file);
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
-  if (lasting && fsync(out.descriptor) != 0 && errno != EINVAL && errno != EROFS) fail(file);
+void write_all(int descriptor, const std::string& file, std::string_view content, bool lasting) {
+  if (descriptor < 0 || write_bytes(descriptor, content) < content.size()) fail(file);
+  if (lasting && fsync(descriptor) != 0 && errno != EINVAL && errno != EROFS) fail(file);
 }
 
 // A full disk gets its room back.
-void write_or_remove(const Open& out, const std::string& file, std::string_view content,
-                     bool lasting) {
+void make(const std::string& file, std::string_view content, bool lasting) {
+  const Open out{open(file.c_str(), kNew, 0666)};
+  if (out.descriptor < 0) fail(file);
   try {
-    write_all(out, file, content, lasting);
+    write_all(out.descriptor, file, content, lasting);
   } catch (...) {
     std::error_code ignored;
     fs::remove(file, ignored);
     throw;
   }
-}
-
-// A file that has the name is removed, not written into: it may be a link, a pipe or the second
-// name of another file.
-void replace(const std::string& file, std::string_view content, bool lasting) {
-  unlink(file.c_str());
-  const Open out{open(file.c_str(), kNew, 0666)};
-  if (out.descriptor < 0) fail(file);
-  write_or_remove(out, file, content, lasting);
 }
 
 // The name in the folder outlasts a loss of power only with the folder.
@@ -96,6 +82,18 @@ Open::~Open() {
   if (descriptor >= 0) close(descriptor);
 }
 
+std::size_t write_bytes(int descriptor, std::string_view content) {
+  std::size_t done = 0;
+  while (done < content.size()) {
+    const ssize_t written = write(descriptor, content.data() + done, content.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written == 0) errno = ENOSPC;
+    if (written <= 0) break;
+    done += static_cast<std::size_t>(written);
+  }
+  return done;
+}
+
 int open_to_write(const std::string& file, int flags) {
   struct stat there {};
   const bool is_pipe = stat(file.c_str(), &there) == 0 && S_ISFIFO(there.st_mode);
@@ -130,7 +128,8 @@ void write_whole_regular(const std::string& file, std::string_view content) {
   if (fs::exists(there) && !fs::is_regular_file(there))
     throw std::runtime_error("cannot write " + file + ": it is there and is no file");
   const std::string fresh = file + ".new";
-  replace(fresh, content, true);
+  unlink(fresh.c_str());  // it may be a link, a pipe or the second name of another file
+  make(fresh, content, true);
   if (std::rename(fresh.c_str(), file.c_str()) != 0) {
     const int reason = errno;
     fs::remove(fresh, error);
@@ -144,20 +143,17 @@ void write_whole(const std::string& file, std::string_view content) {
   std::error_code error;
   const fs::file_status there = fs::status(file, error);
   if (fs::exists(there) && !fs::is_regular_file(there))
-    write_all(Open{open_to_write(file, 0)}, file, content, false);
+    write_all(Open{open_to_write(file, 0)}.descriptor, file, content, false);
   else
     write_whole_regular(file, content);
 }
 
 void write_fresh(const std::string& file, std::string_view content) {
-  replace(file, content, false);
+  unlink(file.c_str());
+  make(file, content, false);
 }
 
-void write_new(const std::string& file, std::string_view content) {
-  Open out{open(file.c_str(), kNew, 0666)};
-  if (out.descriptor < 0) fail(file);
-  write_or_remove(out, file, content, false);
-}
+void write_new(const std::string& file, std::string_view content) { make(file, content, false); }
 
 void check_writable(const std::string& file) {
   std::error_code error;
@@ -177,11 +173,11 @@ void check_writable(const std::string& file) {
 RowFile::RowFile(std::string file, std::size_t kept) : file_(std::move(file)), size_(kept) {
   make_folder_of(file_);
   descriptor_ = open_to_write(file_, O_CREAT | (kept > 0 ? 0 : O_TRUNC));
-  if (descriptor_ < 0) fail();
+  if (descriptor_ < 0) fail(file_);
   const auto end = static_cast<off_t>(kept);
   if (kept > 0 && (ftruncate(descriptor_, end) != 0 || lseek(descriptor_, end, SEEK_SET) != end)) {
     close(std::exchange(descriptor_, -1));
-    fail();
+    fail(file_);
   }
 }
 
@@ -200,21 +196,16 @@ void RowFile::put(std::string_view rows) {
 }
 
 void RowFile::flush() {
-  std::size_t done = 0;
-  while (done < waiting_.size()) {
-    const ssize_t written = write(descriptor_, waiting_.data() + done, waiting_.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) {
-      const int reason = written == 0 ? ENOSPC : errno;
-      waiting_.resize(done);
-      size_ += waiting_.rfind('\n') + 1;  // npos + 1 is 0
-      // Rows cannot be taken back from a device or a pipe.
-      if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) waiting_.clear();
-      close(std::exchange(descriptor_, -1));
-      errno = reason;
-      fail();
-    }
-    done += static_cast<std::size_t>(written);
+  const std::size_t done = write_bytes(descriptor_, waiting_);
+  if (done < waiting_.size()) {
+    const int reason = errno;
+    waiting_.resize(done);
+    size_ += waiting_.rfind('\n') + 1;  // npos + 1 is 0
+    // Rows cannot be taken back from a device or a pipe.
+    if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) waiting_.clear();
+    close(std::exchange(descriptor_, -1));
+    errno = reason;
+    fail(file_);
   }
   size_ += done;
   waiting_.clear();
@@ -225,14 +216,10 @@ void RowFile::keep() {
   fsync(descriptor_);  // devices have none
 }
 
-void RowFile::fail() {
-  throw std::runtime_error(fmt::format("cannot write {}: {}", file_, std::strerror(errno)));
-}
-
 void OutputLock::take(const std::string& file) {
   std::error_code error;
-  const auto there = std::filesystem::status(file, error);
-  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) return;
+  const fs::file_status there = fs::status(file, error);
+  if (fs::exists(there) && !fs::is_regular_file(there)) return;
   make_folder_of(file);
   const std::string name = file + ".lock";
   for (;;) {
@@ -272,8 +259,6 @@ OutputLock::~OutputLock() {
     close(each.descriptor);
   }
 }
-
-namespace fs = std::filesystem;
 
 std::string one_name(const std::string& file) {
   std::error_code error;
@@ -322,7 +307,6 @@ bool is_own(std::string_view head) {
 }  // namespace
 
 void check_replaceable(const std::string& file) {
-  namespace fs = std::filesystem;
   for (const char* with : {"", ".new"}) {
     const std::string name = file + with;
     std::error_code error;

@@ -59,6 +59,9 @@ struct Open {
   ~Open();
 };
 
+/// write(2) until all is written or no more can be, for the reason in errno: how many bytes are.
+std::size_t write_bytes(int descriptor, std::string_view content);
+
 /// open(2) with O_WRONLY and these flags. A pipe without a reader is waited for until a signal
 /// comes that somebody handles: Interrupted.
 int open_to_write(const std::string& file, int flags);
@@ -104,8 +107,6 @@ class RowFile {
   const std::string& name() const { return file_; }
 
  private:
-  [[noreturn]] void fail();
-
   std::string file_, waiting_;
   int descriptor_;
   std::size_t size_;  // of the rows in the file

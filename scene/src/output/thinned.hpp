@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <tether/scene/engine.hpp>
 
 namespace tether::scene {
@@ -18,8 +19,8 @@ class Thinned {
       : most_(most), most_bytes_(most_bytes) {}
 
   void add(Record now) {
-    last_kept_ = seen_++ % stride_ == 0;
-    if (!last_kept_) {
+    last_.reset();
+    if (seen_++ % stride_ != 0) {
       take_errors(all_.back(), now);
       last_ = std::move(now);
       return;
@@ -31,8 +32,8 @@ class Thinned {
 
   /// The last record is kept, whatever went before.
   void finish() {
-    if (!last_kept_) all_.push_back(std::move(last_));
-    last_kept_ = true;
+    if (last_) all_.push_back(std::move(*last_));
+    last_.reset();
   }
 
   const std::vector<Record>& all() const { return all_; }
@@ -51,10 +52,7 @@ class Thinned {
         half.push_back(std::move(all_[i]));
       else
         take_errors(half.back(), all_[i]);
-    if (all_.size() % 2 == 0) {  // the last record may be the end
-      last_ = std::move(all_.back());
-      last_kept_ = false;
-    }
+    if (all_.size() % 2 == 0) last_ = std::move(all_.back());  // it may be the end
     all_ = std::move(half);
     stride_ *= 2;
     bytes_ = 0;
@@ -63,8 +61,7 @@ class Thinned {
 
   std::size_t most_, most_bytes_, bytes_ = 0, stride_ = 1, seen_ = 0;
   std::vector<Record> all_;
-  Record last_{};
-  bool last_kept_ = true;
+  std::optional<Record> last_;  // where it is not kept
 };
 
 }  // namespace tether::scene

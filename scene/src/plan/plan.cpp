@@ -76,75 +76,56 @@ struct Asked {
   bool takes_steps() const { return !event && (stepping || contact || laws); }
 };
 
-/// Lines of what no engine has.
-class Refusals {
- public:
-  Refusals(const Scene& s, const Asked& asked, const std::string& no_event) {
-    refuse_frequencies(s);
-    refuse_engines(asked);
-    refuse(asked.event && !asked.then_steps && !no_event.empty(), no_event);
-    refuse(
-        asked.then_steps && asked.projected,
-        "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
-        "project = false");
-    if (!asked.stepping && !asked.then_steps &&
-        (asked.event || asked.smooth || !(asked.contact || asked.laws)))
-      refuse_fast_loads(s);
-  }
-  const std::string& text() const { return text_; }
-
- private:
-  void refuse(bool wrong, const std::string& line) {
-    if (wrong) text_ += (text_.empty() ? "" : "\n") + line;
-  }
-  void refuse_frequencies(const Scene& s) {
-    const auto resolves = [&](double frequency, const char* of) {
-      refuse(
-          !effects::is_resolved(frequency, s.end),
-          fmt::format("the frequency of {}, {} Hz, {}", of, frequency, effects::unresolved(s.end)));
-    };
-    for (const Load& load : s.loads)
-      if (load.history) resolves(load.history->frequency, "a load");
-    for (const Joint& joint : s.joints)
-      if (joint.motion) resolves(joint.motion->frequency, "the motion of a joint");
-  }
-  void refuse_engines(const Asked& a) {
-    refuse(a.smooth + a.stepping + a.event > 1,
-           a.smooth && a.stepping && !a.event
-               ? "the scene has options for both engines, [smooth] and [stepping]"
-               : "the scene asks for more than one engine: by engine, [smooth], [stepping] or "
-                 "[event]");
-    refuse(a.contact && a.smooth,
-           "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
-    refuse(
-        a.laws && a.smooth,
-        "the joints of the scene have limits, motors or friction, or cables rub, which the smooth "
-        "engine does not have: use [stepping] or [event]");
-    refuse(a.takes_steps() && a.projected,
-           "the stepping engine projects no invariants: give them project = false, or, without "
-           "contacts, use [smooth]");
-  }
+/// Lines of what no engine has; empty: nothing.
+std::string refusals(const Scene& s, const Asked& a, const std::string& no_event) {
+  std::string text;
+  const auto refuse = [&](bool wrong, const std::string& line) {
+    if (wrong) text += (text.empty() ? "" : "\n") + line;
+  };
+  const auto resolves = [&](const auto& motion, const char* of) {
+    if (motion)
+      refuse(!effects::is_resolved(motion->frequency, s.end),
+             fmt::format("the frequency of {}, {} Hz, {}", of, motion->frequency,
+                         effects::unresolved(s.end)));
+  };
+  for (const Load& load : s.loads) resolves(load.history, "a load");
+  for (const Joint& joint : s.joints) resolves(joint.motion, "the motion of a joint");
+  refuse(a.smooth + a.stepping + a.event > 1,
+         a.smooth && a.stepping && !a.event
+             ? "the scene has options for both engines, [smooth] and [stepping]"
+             : "the scene asks for more than one engine: by engine, [smooth], [stepping] or "
+               "[event]");
+  refuse(a.contact && a.smooth,
+         "the smooth engine ([smooth]) has no contacts ([[pair]]): use [stepping] or [event]");
+  refuse(a.laws && a.smooth,
+         "the joints of the scene have limits, motors or friction, or cables rub, which the smooth "
+         "engine does not have: use [stepping] or [event]");
+  refuse(a.takes_steps() && a.projected,
+         "the stepping engine projects no invariants: give them project = false, or, without "
+         "contacts, use [smooth]");
+  refuse(a.event && !a.then_steps && !no_event.empty(), no_event);
+  refuse(a.then_steps && a.projected,
+         "[event] otherwise = \"stepping\": the stepping engine projects no invariants: give them "
+         "project = false");
   // Engines whose steps resolve a load.
-  void refuse_fast_loads(const Scene& s) {
-    for (const Load& load : s.loads) {
-      if (!effects::pushes(load)) continue;
-      const double steps = effects::kStepsOfPeriod * load.history->frequency * s.end;
-      refuse(!(steps <= kMostSteps),
-             fmt::format("a load of {:g} Hz takes {:.3g} steps until the end in the engines smooth "
-                         "and event, {:g} at most are taken: use [stepping], which takes means",
-                         load.history->frequency, steps, kMostSteps));
-    }
+  if (a.stepping || a.then_steps || (!a.event && !a.smooth && (a.contact || a.laws))) return text;
+  for (const Load& load : s.loads) {
+    if (!effects::pushes(load)) continue;
+    const double steps = effects::kStepsOfPeriod * load.history->frequency * s.end;
+    refuse(!(steps <= kMostSteps),
+           fmt::format("a load of {:g} Hz takes {:.3g} steps until the end in the engines smooth "
+                       "and event, {:g} at most are taken: use [stepping], which takes means",
+                       load.history->frequency, steps, kMostSteps));
   }
-
-  std::string text_;
-};
+  return text;
+}
 
 EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
   const Asked asked(s);
   no_event = asked.contact || asked.laws || asked.event ? event_engine_refusal(s)
                                                         : std::string(kNothingTouches);
-  const Refusals refusals(s, asked, no_event);
-  if (!refusals.text().empty()) throw std::invalid_argument(refusals.text());
+  if (const std::string refused = refusals(s, asked, no_event); !refused.empty())
+    throw std::invalid_argument(refused);
   if (asked.other) {
     why = "the scene asks for it";
     return s.engine;
@@ -169,12 +150,6 @@ EngineKind choose(const Scene& s, std::string& why, std::string& no_event) {
           : asked.smooth ? "nothing touches, and the scene asks for it"
                          : "nothing touches";
   return asked.takes_steps() ? EngineKind::stepping : EngineKind::smooth;
-}
-
-// How steps are taken, after why there are any.
-std::string with_accuracy(const Scene& scene) {
-  const double accuracy = scene.stepping.value_or(SteppingOptions{}).accuracy;
-  return accuracy > 0 ? fmt::format("; sub-steps within an accuracy of {:g}", accuracy) : "";
 }
 
 // Which engines could move the scene, too, or why not.
@@ -208,9 +183,10 @@ int joint_rows(const Joint& joint) { return joints::row_count(joint); }
 Plan make_plan(const Scene& scene) {
   Plan plan;
   plan.engine = choose(scene, plan.why, plan.no_event);
-  if (plan.engine == EngineKind::stepping) plan.why += with_accuracy(scene);
-  if (plan.engine == EngineKind::event && goes_on_in_steps(scene))
-    plan.then_steps = scene.stepping.value_or(SteppingOptions{}).step;
+  const SteppingOptions stepping = scene.stepping.value_or(SteppingOptions{});
+  if (plan.engine == EngineKind::stepping && stepping.accuracy > 0)
+    plan.why += fmt::format("; sub-steps within an accuracy of {:g}", stepping.accuracy);
+  if (plan.engine == EngineKind::event && goes_on_in_steps(scene)) plan.then_steps = stepping.step;
   for (const effects::Effect* each : effects::all()) each->plan(scene, plan.engine, plan.effects);
   for (const Body& body : scene.bodies) {
     ++plan.bodies;

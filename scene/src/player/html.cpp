@@ -190,7 +190,7 @@ class PageRecorder : public Recorder {
       : scene_(run.scene),
         file_(file),
         start_energy_(run.start_energy),
-        restarted_(run.resume.restarted),
+        restarted_(run.resume.time),
         moving_(run.scene.moving()),
         view_(view_of(run.scene)),
         film_(moving_, view_) {
@@ -204,7 +204,7 @@ class PageRecorder : public Recorder {
 
   void finish(std::vector<std::string>& written, std::vector<std::string>& remarks) override {
     film_.finish();
-    if (film_.size() == 0) return;
+    if (film_.frames().empty()) return;
     write_whole(file_, page());
     written.push_back(file_);
     if (restarted_) remarks.push_back(file_ + " shows the motion from the restart on");
@@ -217,15 +217,24 @@ class PageRecorder : public Recorder {
     nlohmann::json data = scene_data(scene_, moving_, view_);
     data["engine"] = engine_;
     data["start_energy"] = start_energy_;
-    film_.add_to(data);
-    out += data_script("film-data", data);
-    const auto numbers = [&](const char* id, const std::string& base64) {
+    for (const Film::Frame& each : film_.frames()) {
+      data["times"].push_back(each.time);
+      data["kinetic"].push_back(each.d.kinetic_energy);
+      data["potential"].push_back(each.d.potential_energy);
+      data["drift"].push_back(each.d.drift);
+      data["penetration"].push_back(each.d.penetration);
+      data["residual"].push_back(each.d.residual);
+      data["contacts"].push_back(each.contacts.size() / 9);
+    }
+    out +=
+        "<script id=\"film-data\" type=\"application/json\">" + script_text(data) + "</script>\n";
+    const auto add = [&](const char* id, const std::string& base64) {
       out += fmt::format("<script id=\"{}\" type=\"text/plain\">{}</script>\n", id, base64);
     };
-    numbers("film-positions", film_.positions());
-    numbers("film-orientations", film_.orientations());
-    numbers("film-contacts", film_.contacts());
-    return out + page_end(kScript);
+    add("film-positions", film_.joined(&Film::Frame::positions));
+    add("film-orientations", film_.joined(&Film::Frame::orientations));
+    add("film-contacts", film_.joined(&Film::Frame::contacts));
+    return out + "<script>\n" + std::string(kScript) + "</script>\n</body>\n</html>\n";
   }
 
   const Scene& scene_;

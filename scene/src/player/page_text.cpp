@@ -85,17 +85,6 @@ std::string page_head(const std::string& title, std::string_view style) {
   return out + "</style>\n</head>\n<body>\n";
 }
 
-std::string page_end(std::string_view script) {
-  std::string out = "<script>\n";
-  out += script;
-  return out + "</script>\n</body>\n</html>\n";
-}
-
-std::string data_script(const std::string& id, const nlohmann::json& value) {
-  return "<script id=\"" + id + "\" type=\"application/json\">" + script_text(value) +
-         "</script>\n";
-}
-
 std::string base64(const std::vector<float>& values) {
   return base64(little_endian<std::uint32_t>(values));
 }

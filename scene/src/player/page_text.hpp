@@ -17,12 +17,9 @@ std::string script_text(const nlohmann::json& value);
 /// Text of an HTML element, in UTF-8.
 std::string html_text(const std::string& text);
 
-/// The page up to its body, and from its script on. Its policy lets it load nothing and send
-/// nothing, whatever its texts say.
+/// The page up to its body. Its policy lets it load nothing and send nothing, whatever its texts
+/// say.
 std::string page_head(const std::string& title, std::string_view style);
-std::string page_end(std::string_view script);
-/// Values for the script.
-std::string data_script(const std::string& id, const nlohmann::json& value);
 
 /// Little-endian, in base 64.
 std::string base64(const std::vector<float>& values);

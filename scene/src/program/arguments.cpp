@@ -1,9 +1,6 @@
 // Tether: numbers of the command line. SPDX-License-Identifier: BSD-3-Clause
 #include "commands.hpp"
 
-#include <fmt/core.h>
-
-#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
@@ -50,6 +47,14 @@ std::vector<double> range(const std::string& word, const std::vector<std::string
 }
 
 }  // namespace
+
+void check_outputs(const Output& files, const std::vector<std::string>& inputs, bool force) {
+  formats::check_names(files, inputs);
+  for (const std::string& file : formats::names(files)) {
+    if (!force) check_replaceable(file);
+    check_writable(file);
+  }
+}
 
 std::optional<double> finite_number(const std::string& text) {
   double value = 0;

@@ -5,14 +5,20 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
 #include <string>
 #include <string_view>
 #include <tether/scene/files.hpp>
+#include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 #include <tether/scene/vary.hpp>
 #include <vector>
 
+#include "output/files.hpp"
 #include "program/process.hpp"
+#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -24,20 +30,19 @@ std::string on_terminal(std::string_view text);
 /// A field of CSV: quoted where it has to be; control characters become blanks.
 std::string table_field(std::string_view text);
 
-/// Energies, errors and work.
-void print_summary(const Scene& scene, const RunResult& result);
+/// Energies, errors, work, times, each [[expect]] with the value found, and files. `shared`: a line
+/// behind the summary, or nothing; `wall`: seconds of the whole program, reading and output
+/// included.
+void report(const Scene& scene, const RunResult& result, const std::string& shared, double wall);
 /// Warnings of what the scene begins with that its author may not have meant.
 void print_start(const Scene& scene);
-/// Times of the engine and of the whole program: `wall` seconds, reading and output included.
-void print_times(const RunResult& result, double wall);
-/// Each [[expect]] with the value found.
-void print_judgements(const Scene& scene, const RunResult& result);
 /// Time spent on each effect.
 void print_costs(const RunResult& result);
-/// Files that were written, and remarks on those that were not.
-void print_files(const RunResult& result);
 /// kGood, kNotMet or kFailed.
 int exit_code(const RunResult& result);
+
+/// Files that would be lost, or cannot be written, are told before the work.
+void check_outputs(const Output& files, const std::vector<std::string>& inputs, bool force);
 
 /// A finite number; nothing else has a value.
 std::optional<double> finite_number(const std::string& text);

@@ -20,7 +20,6 @@
 #include <algorithm>
 #include <ctime>
 #include <fmt/core.h>
-#include <initializer_list>
 #include <stdexcept>
 #include <sys/wait.h>
 
@@ -33,6 +32,8 @@ void guard_standard_streams() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -57,19 +58,11 @@ StandardOutput::~StandardOutput() {
 
 void StandardOutput::write(const std::string& content) {
   if (file_ != "-") return write_whole(file_, content);
-  std::size_t at = 0;
-  while (at < content.size()) {
-    const ssize_t n = ::write(real_, content.data() + at, content.size() - at);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0 && errno == EPIPE) {
-      reader_left = true;
-      return;
-    }
-    if (n <= 0)
-      throw std::runtime_error(std::string("cannot write the standard output: ") +
-                               std::strerror(errno));
-    at += static_cast<std::size_t>(n);
-  }
+  if (write_bytes(real_, content) == content.size()) return;
+  reader_left = errno == EPIPE;
+  if (!reader_left)
+    throw std::runtime_error(std::string("cannot write the standard output: ") +
+                             std::strerror(errno));
 }
 
 int flushed(int status) {
@@ -85,8 +78,6 @@ int flushed(int status) {
                reason != 0 ? std::strerror(reason) : "");
   return kWrong;
 }
-
-namespace fs = std::filesystem;
 
 StandardOutputFile::StandardOutputFile(Output& output) {
   std::string* there = nullptr;
@@ -177,19 +168,6 @@ struct Job {
   std::string result;
 };
 
-[[noreturn]] void child(int pipe, const std::function<std::string(std::size_t)>& work,
-                        std::size_t number) {
-  const std::string result = work(number);
-  std::size_t at = 0;
-  while (at < result.size()) {
-    const ssize_t n = write(pipe, result.data() + at, result.size() - at);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) _exit(1);
-    at += static_cast<std::size_t>(n);
-  }
-  _exit(0);  // what the parent has yet to print stays its own
-}
-
 Job begin(std::size_t number, const std::function<std::string(std::size_t)>& work) {
   int ends[2];
   if (pipe(ends) != 0) throw std::runtime_error(std::string("no pipe: ") + std::strerror(errno));
@@ -201,7 +179,9 @@ Job begin(std::size_t number, const std::function<std::string(std::size_t)>& wor
   }
   if (process == 0) {
     close(ends[0]);
-    child(ends[1], work, number);
+    const std::string result = work(number);
+    // The parent prints what it has yet to print.
+    _exit(write_bytes(ends[1], result) == result.size() ? 0 : 1);
   }
   close(ends[1]);
   return {number, process, ends[0], ""};

@@ -19,10 +19,10 @@ int caught_signal();
 
 /// Exit codes of `tether`.
 enum ExitCode : int {
-  kGood = 0,
-  kNotMet = 1,   ///< an [[expect]] does not hold, a contact problem is not solved
-  kWrong = 2,    ///< a file, a scene or an option is wrong; nothing was run
-  kFailed = 3,   ///< the run could not go on
+  kGood,
+  kNotMet,       ///< an [[expect]] does not hold, a contact problem is not solved
+  kWrong,        ///< a file, a scene or an option is wrong; nothing was run
+  kFailed,       ///< the run could not go on
   kSignal = 128  ///< and the number of the signal that ended it, as shells have it
 };
 

@@ -1,11 +1,7 @@
 // Tether: prints what a run gave. SPDX-License-Identifier: BSD-3-Clause
 #include "commands.hpp"
 
-#include <fmt/core.h>
-#include <fmt/format.h>
-
 #include <ctime>
-#include <tether/scene/plan.hpp>
 #include <tether/scene/words.hpp>
 
 #include "bounds.hpp"
@@ -146,8 +142,6 @@ void print_work(const Scene& scene, const Summary& s, const Counts& c) {
   }
 }
 
-}  // namespace
-
 void print_summary(const Scene& scene, const RunResult& r) {
   const Summary& s = r.summary;
   const Counts& c = r.counts;
@@ -165,18 +159,6 @@ void print_summary(const Scene& scene, const RunResult& r) {
   for (const std::string& warning : r.warnings)
     fmt::print("  WARNING      {}\n", on_terminal(warning));
   if (!r.failure.empty()) fmt::print("  stopped at {:g} s: {}\n", r.time, on_terminal(r.failure));
-}
-
-void print_start(const Scene& scene) {
-  for (const std::string& each : overlaps_at_start(scene))
-    fmt::print("WARNING   {}\n", on_terminal(each));
-  const std::vector<std::string> names = bodies_out_of_touch(scene);
-  if (names.empty()) return;
-  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kMostNamed, names.size()));
-  fmt::print(
-      "note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
-      fmt::join(names.begin(), end, ", "),
-      names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
 }
 
 void print_times(const RunResult& r, double wall) {
@@ -207,6 +189,35 @@ void print_judgements(const Scene& scene, const RunResult& r) {
   table.print();
 }
 
+}  // namespace
+
+void report(const Scene& scene, const RunResult& r, const std::string& shared, double wall) {
+  print_summary(scene, r);
+  fmt::print("{}", shared);
+  print_times(r, wall);
+  print_judgements(scene, r);
+  for (const std::string& file : r.written) fmt::print("written: {}\n", on_terminal(file));
+  for (const std::string& remark : r.remarks) fmt::print("note: {}\n", on_terminal(remark));
+  if (r.interrupted)
+    fmt::print("interrupted at {:.9g} s of {:g} s{}\n", r.time, scene.end,
+               scene.output["state"].empty()
+                   ? ""
+                   : fmt::format("; to go on: --restart {}", scene.output["state"]));
+  std::fflush(stdout);
+}
+
+void print_start(const Scene& scene) {
+  for (const std::string& each : overlaps_at_start(scene))
+    fmt::print("WARNING   {}\n", on_terminal(each));
+  const std::vector<std::string> names = bodies_out_of_touch(scene);
+  if (names.empty()) return;
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kMostNamed, names.size()));
+  fmt::print(
+      "note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
+      fmt::join(names.begin(), end, ", "),
+      names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
+}
+
 // Everything on the clock: parts that were measured on different clocks add up to nothing.
 void print_costs(const RunResult& r) {
   double sum = 0;
@@ -221,11 +232,6 @@ void print_costs(const RunResult& r) {
   for (const EffectCost& each : r.costs) add(each.effect, each.seconds);
   add("start, records, expectations", std::max(0.0, r.whole_wall - sum));
   table.print();
-}
-
-void print_files(const RunResult& r) {
-  for (const std::string& file : r.written) fmt::print("written: {}\n", on_terminal(file));
-  for (const std::string& remark : r.remarks) fmt::print("note: {}\n", on_terminal(remark));
 }
 
 int exit_code(const RunResult& r) {

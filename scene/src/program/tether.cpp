@@ -5,8 +5,6 @@
 #include <sstream>
 
 #include "commands.hpp"
-#include "output/files.hpp"
-#include "program/process.hpp"
 
 namespace {
 

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 
 namespace tether {
@@ -49,28 +48,16 @@ void Progress::show(Clock::time_point now) {
   const double share = std::min(1.0, (done_work_ + share_ * run_work_) / all_work_);
   if (terminal_) {
     const int filled = static_cast<int>(share * kWidth);
-    print(fmt::format("\r\033[K[{:#<{}}{:<{}}] {:3.0f} %  {}{}", "", filled, "", kWidth - filled,
-                      100.0 * share, what_, time_left(now, share)));
+    print(fmt::format("\r\033[K[{:#<{}}{:<{}}] {:3.0f} %  {}", "", filled, "", kWidth - filled,
+                      100.0 * share, what_));
     std::fflush(stderr);
-    visible_ = true;
   } else {
-    print(fmt::format("{:3.0f} %  {}{}\n", 100.0 * share, what_, time_left(now, share)));
+    print(fmt::format("{:3.0f} %  {}\n", 100.0 * share, what_));
   }
 }
 
-// Time that is left in runs of some seconds: their steps may become dearer, so that it is a guess.
-std::string Progress::time_left(Clock::time_point now, double share) const {
-  const double passed = std::chrono::duration<double>(now - begin_).count();
-  if (passed < 3 || share < 0.01 || share >= 1) return "";
-  const double left = passed * (1 - share) / share;
-  if (left < 90) return fmt::format("  about {:.0f} s left", std::ceil(left));
-  if (left < 5400) return fmt::format("  about {:.0f} min left", left / 60);
-  return fmt::format("  about {:.1f} h left", left / 3600);
-}
-
 void Progress::hide() {
-  if (visible_) print("\r\033[K");
-  visible_ = false;
+  if (terminal_) print("\r\033[K");
 }
 
 }  // namespace tether

@@ -24,14 +24,12 @@ class Progress {
  private:
   using Clock = std::chrono::steady_clock;
   void show(Clock::time_point now);
-  std::string time_left(Clock::time_point now, double share) const;
 
   double all_work_, done_work_ = 0.0, run_work_ = 0.0;
   bool terminal_;
   double share_ = 0.0, duration_ = 1.0;
   std::string what_;
-  Clock::time_point begin_ = Clock::now(), next_;
-  bool visible_ = false;
+  Clock::time_point next_;
 };
 
 }  // namespace tether

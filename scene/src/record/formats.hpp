@@ -2,16 +2,17 @@
 #pragma once
 
 #include <charconv>
+#include <optional>
 #include <tether/scene/plan.hpp>
 #include <tether/scene/run.hpp>
 
 namespace tether::scene {
 
-/// Start of a continued run: recorders keep their output up to then and drop later parts.
+/// Start of a run, with a time where it is continued: recorders keep their output up to then and
+/// drop later parts.
 struct Resume {
-  bool restarted = false;
-  double time = 0;           // s, of the last record that a run in one piece has, too
-  std::uint64_t events = 0;  // found until the state was saved
+  std::optional<double> time;  // s, of the last record that a run in one piece has, too
+  std::uint64_t events = 0;    // found until the state was saved
 };
 
 class Recorder {

@@ -2,12 +2,12 @@
 // and its errors over time. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "bounds.hpp"
 #include "formats.hpp"
 #include "output/files.hpp"
 #include "output/thinned.hpp"
-#include "picture/axes.hpp"
 #include "picture/scene_drawing.hpp"
 
 namespace tether::scene {
@@ -49,7 +49,10 @@ class PictureRecorder : public Recorder {
     for (; events_ < engine.events().size(); ++events_)
       if (const ContactEvent& each = engine.events()[events_]; is_of_joint(each.kind))
         holds_[static_cast<std::size_t>(each.joint)] = each.kind == ContactEvent::Kind::attach;
-    instants_.add(instant(engine, d));
+    Instant now{engine.time(), d, {}};
+    for (std::size_t b = 0; b < bodies_; ++b)
+      now.bodies.push_back({engine.bodies()[b].position, engine.bodies()[b].orientation});
+    instants_.add(std::move(now));
   }
 
   void finish(std::vector<std::string>& written, std::vector<std::string>&) override {
@@ -60,14 +63,6 @@ class PictureRecorder : public Recorder {
   }
 
  private:
-  Instant instant(const Engine& engine, const Diagnostics& d) const {
-    Instant now{engine.time(), d, {}};
-    now.bodies.reserve(bodies_);
-    for (std::size_t b = 0; b < bodies_; ++b)
-      now.bodies.push_back({engine.bodies()[b].position, engine.bodies()[b].orientation});
-    return now;
-  }
-
   std::string svg() const {
     Canvas canvas(kPicture.right, kPicture.bottom);
     const std::string title = scene_.name.empty() ? scene_.file : scene_.name;
@@ -105,8 +100,8 @@ class PictureRecorder : public Recorder {
   }
 
   /// `peaks`: the largest between two points, as errors are told; else the value itself.
-  template <class Value>
-  Curve curve(const char* title, const char* colour, Value value, bool peaks) const {
+  Curve curve(const char* title, const char* colour, bool peaks,
+              const std::function<double(const Diagnostics&)>& value) const {
     Curve out{{title, colour}, {}};
     const std::vector<Instant>& all = instants_.all();
     const std::size_t step = 1 + all.size() / kMostPoints;
@@ -120,39 +115,30 @@ class PictureRecorder : public Recorder {
     return out;
   }
 
+  static double energy(const Diagnostics& d) { return d.kinetic_energy + d.potential_energy; }
+
   std::vector<Curve> energies() const {
-    return {
-        curve(
-            "kinetic", "#0072b2", [](const Diagnostics& d) { return d.kinetic_energy; }, false),
-        curve(
-            "potential", "#e69f00", [](const Diagnostics& d) { return d.potential_energy; }, false),
-        curve(
-            "sum", "#202020",
-            [](const Diagnostics& d) { return d.kinetic_energy + d.potential_energy; }, false)};
+    return {curve("kinetic", "#0072b2", false, &Diagnostics::kinetic_energy),
+            curve("potential", "#e69f00", false, &Diagnostics::potential_energy),
+            curve("sum", "#202020", false, energy)};
   }
 
   /// Those that are not zero throughout.
   std::vector<Curve> errors() const {
-    const std::array<Curve, 4> all = {
-        curve(
-            "energy change / J", "#202020",
-            [this](const Diagnostics& d) {
-              return std::abs(d.kinetic_energy + d.potential_energy - start_energy_);
-            },
-            true),
-        curve(
-            "drift", "#d55e00", [](const Diagnostics& d) { return d.drift; }, true),
-        curve(
-            "penetration / m", "#009e73", [](const Diagnostics& d) { return d.penetration; }, true),
-        curve(
-            "residual", "#cc79a7", [](const Diagnostics& d) { return d.residual; }, true)};
+    const auto change = [this](const Diagnostics& d) {
+      return std::abs(energy(d) - start_energy_);
+    };
     std::vector<Curve> out;
-    for (const Curve& each : all) {
+    for (Curve each : {curve("energy change / J", "#202020", true, change),
+                       curve("drift", "#d55e00", true, &Diagnostics::drift),
+                       curve("penetration / m", "#009e73", true, &Diagnostics::penetration),
+                       curve("residual", "#cc79a7", true, &Diagnostics::residual)}) {
       double most = 0;
-      for (const Vector2d& p : each.points) most = std::max(most, p.y());
-      if (!(most > kLeastError)) continue;
-      out.push_back(each);
-      for (Vector2d& p : out.back().points) p.y() = std::max(p.y(), kLeastError);
+      for (Vector2d& p : each.points) {
+        most = std::max(most, p.y());
+        p.y() = std::max(p.y(), kLeastError);
+      }
+      if (most > kLeastError) out.push_back(std::move(each));
     }
     return out;
   }

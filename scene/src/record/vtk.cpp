@@ -15,52 +15,6 @@ namespace tether::scene {
 
 namespace {
 
-/// Binary arrays behind the XML, each with its length in front.
-class Appended {
- public:
-  template <class T>
-  std::size_t add(const std::vector<T>& values) {
-    const std::size_t offset = bytes_.size();
-    const std::uint64_t length = values.size() * sizeof(T);
-    append(&length, sizeof length);
-    append(values.data(), length);
-    return offset;
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  void append(const void* data, std::size_t length) {
-    if (length > 0) bytes_.append(static_cast<const char*>(data), length);
-  }
-  std::string bytes_;
-};
-
-/// One .vtp file: points, then single points and polygons on them, then data of the points.
-class PolyData {
- public:
-  std::vector<float> points;
-  std::vector<std::int32_t> vertices, polygons, ends;  // `ends`: of each polygon in `polygons`
-
-  void scalars(const char* name, const std::vector<float>& values) { data(name, values, 1); }
-  void vectors(const char* name, const std::vector<float>& values) { data(name, values, 3); }
-
-  void write(const std::string& file);
-  /// The .pvtp of pieces with data as these, in files beside it.
-  void write_joined(const std::string& file, const std::vector<std::string>& pieces) const;
-
- private:
-  void data(const char* name, const std::vector<float>& values, int components);
-  std::string data_, declared_;  // the data in this file, and in each piece
-  Appended appended_;
-};
-
-std::string array(const char* type, const char* name, int components, std::size_t offset) {
-  return fmt::format(
-      "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
-      "offset=\"{}\"/>\n",
-      type, name, components, offset);
-}
-
 std::string declaration(const char* name, int components) {
   return fmt::format("<PDataArray type=\"Float32\" Name=\"{}\" NumberOfComponents=\"{}\"/>\n", name,
                      components);
@@ -72,6 +26,61 @@ std::string begin(const char* type) {
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n",
       kMarkup, type);
 }
+
+/// One .vtp file: points, then single points and polygons on them, then data of the points.
+class PolyData {
+ public:
+  std::vector<float> points;
+  std::vector<std::int32_t> vertices, polygons, ends;  // `ends`: of each polygon in `polygons`
+
+  void data(const char* name, const std::vector<float>& values, int components) {
+    data_ += array("Float32", name, components, values);
+    declared_ += declaration(name, components);
+  }
+
+  void write(const std::string& file) {
+    std::vector<std::int32_t> each(vertices.size());
+    for (std::size_t i = 0; i < each.size(); ++i) each[i] = static_cast<std::int32_t>(i + 1);
+    std::string xml =
+        begin("PolyData") + fmt::format(
+                                "<PolyData>\n<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" "
+                                "NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",
+                                points.size() / 3, vertices.size(), ends.size());
+    xml += "<PointData>\n" + data_ + "</PointData>\n<Points>\n" +
+           array("Float32", "Points", 3, points) + "</Points>\n<Verts>\n" +
+           array("Int32", "connectivity", 1, vertices) + array("Int32", "offsets", 1, each) +
+           "</Verts>\n<Polys>\n" + array("Int32", "connectivity", 1, polygons) +
+           array("Int32", "offsets", 1, ends) +
+           "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
+    write_fresh(file, xml + appended_ + "\n</AppendedData>\n</VTKFile>\n");
+  }
+
+  /// The .pvtp of pieces with data as these, in files beside it.
+  void write_joined(const std::string& file, const std::vector<std::string>& pieces) const {
+    std::string xml = begin("PPolyData") + "<PPolyData GhostLevel=\"0\">\n<PPointData>\n" +
+                      declared_ + "</PPointData>\n<PPoints>\n" + declaration("Points", 3) +
+                      "</PPoints>\n";
+    for (const std::string& piece : pieces) xml += fmt::format("<Piece Source=\"{}\"/>\n", piece);
+    write_fresh(file, xml + "</PPolyData>\n</VTKFile>\n");
+  }
+
+ private:
+  /// A binary array behind the XML, with its length in front.
+  template <class T>
+  std::string array(const char* type, const char* name, int components,
+                    const std::vector<T>& values) {
+    const std::size_t offset = appended_.size();
+    const std::uint64_t length = values.size() * sizeof(T);
+    appended_.append(reinterpret_cast<const char*>(&length), sizeof length);
+    if (length > 0) appended_.append(reinterpret_cast<const char*>(values.data()), length);
+    return fmt::format(
+        "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
+        "offset=\"{}\"/>\n",
+        type, name, components, offset);
+  }
+  std::string data_, declared_;  // the data in this file, and in each piece
+  std::string appended_;
+};
 
 using Eigen::Vector3d;
 
@@ -97,7 +106,7 @@ class VtkRecorder : public Recorder {
         forces_(run.scene.output.forces),
         among_(run.among) {
     const Scene& scene = run.scene;
-    if (run.resume.restarted) keep_up_to(run.resume.time);
+    if (run.resume.time) keep_up_to(*run.resume.time);
     make_folder_of(folder_ + "/x");
     if (among_.rank == 0) check_writable(file_);
     std::size_t surfaces = 0;
@@ -223,10 +232,10 @@ class VtkRecorder : public Recorder {
         }
       }
     }
-    out.scalars("body", index);
-    out.scalars("radius", radius);
-    out.vectors("velocity", velocity);
-    out.vectors("angular_velocity", spin);
+    out.data("body", index, 1);
+    out.data("radius", radius, 1);
+    out.data("velocity", velocity, 3);
+    out.data("angular_velocity", spin, 3);
     return out;
   }
 
@@ -246,11 +255,11 @@ class VtkRecorder : public Recorder {
     std::vector<float> values;
     for (const auto& [name, member] : vectors) {
       for (std::size_t k = of.first; k < of.last; ++k) put(values, all[k].*member);
-      out.vectors(name, std::exchange(values, {}));
+      out.data(name, std::exchange(values, {}), 3);
     }
     for (const auto& [name, member] : scalars) {
       for (std::size_t k = of.first; k < of.last; ++k) values.push_back(float(all[k].*member));
-      out.scalars(name, std::exchange(values, {}));
+      out.data(name, std::exchange(values, {}), 1);
     }
     return out;
   }
@@ -302,37 +311,6 @@ void add_film(const std::string& vtk, const formats::Beginning& run, formats::Re
 }
 
 }  // namespace
-
-void PolyData::data(const char* name, const std::vector<float>& values, int components) {
-  data_ += array("Float32", name, components, appended_.add(values));
-  declared_ += declaration(name, components);
-}
-
-void PolyData::write(const std::string& file) {
-  std::vector<std::int32_t> each(vertices.size());
-  for (std::size_t i = 0; i < each.size(); ++i) each[i] = static_cast<std::int32_t>(i + 1);
-  std::string xml =
-      begin("PolyData") + fmt::format(
-                              "<PolyData>\n<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" "
-                              "NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",
-                              points.size() / 3, vertices.size(), ends.size());
-  xml += "<PointData>\n" + data_ + "</PointData>\n<Points>\n" +
-         array("Float32", "Points", 3, appended_.add(points)) + "</Points>\n<Verts>\n" +
-         array("Int32", "connectivity", 1, appended_.add(vertices)) +
-         array("Int32", "offsets", 1, appended_.add(each)) + "</Verts>\n<Polys>\n" +
-         array("Int32", "connectivity", 1, appended_.add(polygons)) +
-         array("Int32", "offsets", 1, appended_.add(ends)) +
-         "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
-  write_fresh(file, xml + appended_.bytes() + "\n</AppendedData>\n</VTKFile>\n");
-}
-
-void PolyData::write_joined(const std::string& file, const std::vector<std::string>& pieces) const {
-  std::string xml = begin("PPolyData") + "<PPolyData GhostLevel=\"0\">\n<PPointData>\n" +
-                    declared_ + "</PPointData>\n<PPoints>\n" + declaration("Points", 3) +
-                    "</PPoints>\n";
-  for (const std::string& piece : pieces) xml += fmt::format("<Piece Source=\"{}\"/>\n", piece);
-  write_fresh(file, xml + "</PPolyData>\n</VTKFile>\n");
-}
 
 namespace formats {
 

@@ -4,31 +4,13 @@
 #include <algorithm>
 
 #include "bounds.hpp"
-#include "output/binary.hpp"
 
 namespace tether::scene {
 
 namespace {
 
-/// k * every, k = 1, 2, ..., up to the end (to rounding).
-std::vector<double> multiples(double every, double end) {
-  std::vector<double> times;
-  const double count = end / every * (1 + 1e-12);
-  for (long k = 1; static_cast<double>(k) <= count; ++k)
-    times.push_back(static_cast<double>(k) * every);
-  return times;
-}
-
-void merge(const Event& from, Event& into) {
-  if (from.record && !into.record) into.time = from.time;
-  into.record = into.record || from.record;
-  into.expect = into.expect || from.expect;
-  into.checkpoint = into.checkpoint || from.checkpoint;
-  into.stop = into.stop || from.stop;
-  into.end = into.end || from.end;
-}
-
-std::vector<double> three(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+using Eigen::Vector3d;
+using Value = std::vector<double>;
 
 /// The larger one; NaN counts as infinity.
 double larger(double a, double b) {
@@ -36,7 +18,7 @@ double larger(double a, double b) {
 }
 
 /// Largest difference of a component; quaternions stand for the same orientation in both signs.
-double difference(Quantity quantity, const std::vector<double>& a, const std::vector<double>& b) {
+double difference(Quantity quantity, const Value& a, const Value& b) {
   double same = 0, opposite = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     same = larger(same, std::abs(a[i] - b[i]));
@@ -46,137 +28,121 @@ double difference(Quantity quantity, const std::vector<double>& a, const std::ve
 }
 
 /// The number that one-sided bounds apply to.
-double size(const std::vector<double>& value) {
+double size(const Value& value) {
   if (value.size() == 1) return value.front();
   double square = 0;
   for (const double x : value) square += x * x;
   return std::sqrt(square);
 }
 
-/// Calls f(force on the body, slip) for its contacts, with one other body where that is named.
-template <class F>
-void each_contact(const Expect& expect, const Engine& engine, const F& f) {
-  for (const ContactState& c : engine.contacts()) {
-    const bool first = c.first == expect.body;
-    if (!first && c.second != expect.body) continue;
-    if (expect.against >= 0 && expect.against != (first ? c.second : c.first)) continue;
-    f(first ? c.force : Eigen::Vector3d(-c.force), c.slip);
+/// The engine as an expectation sees it.
+struct Seen {
+  const Scene& scene;
+  const Expect& expect;
+  const Engine& engine;
+  double start_energy;
+
+  std::size_t index() const { return static_cast<std::size_t>(std::max(expect.body, 0)); }
+  const BodyState& body() const { return engine.bodies()[index()]; }
+  Diagnostics d() const { return engine.diagnostics(); }
+  double energy() const {
+    const Diagnostics now = d();
+    return now.kinetic_energy + now.potential_energy;
   }
+  JointForce joint() const {
+    return engine.forces().joints[static_cast<std::size_t>(expect.joint)];
+  }
+  /// Sum of the forces on the body, and the largest slip of those that push, at its contacts with
+  /// all bodies or with the one that is named.
+  std::pair<Vector3d, double> contacts() const {
+    std::pair<Vector3d, double> out(Vector3d::Zero(), 0);
+    for (const ContactState& c : engine.contacts()) {
+      const bool first = c.first == expect.body;
+      if (!first && c.second != expect.body) continue;
+      if (expect.against >= 0 && expect.against != (first ? c.second : c.first)) continue;
+      out.first += first ? c.force : Vector3d(-c.force);
+      if (!c.force.isZero(0)) out.second = std::max(out.second, c.slip.norm());
+    }
+    return out;
+  }
+};
+
+Value list(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Value list(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+Value list(double x) { return {x}; }
+
+template <class F>
+std::pair<const Quantity, std::function<Value(const Seen&)>> value(Quantity quantity, F f) {
+  return {quantity, [f](const Seen& s) { return list(f(s)); }};
 }
 
-Eigen::Vector3d contact_force(const Expect& expect, const Engine& engine) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  each_contact(expect, engine,
-               [&](const Eigen::Vector3d& force, const Eigen::Vector3d&) { sum += force; });
-  return sum;
-}
-
-double contact_slip(const Expect& expect, const Engine& engine) {
-  double most = 0;
-  each_contact(expect, engine, [&](const Eigen::Vector3d& force, const Eigen::Vector3d& slip) {
-    if (!force.isZero(0)) most = std::max(most, slip.norm());
-  });
-  return most;
-}
-
-void exchange(binary::Archive io, std::vector<Judgement>& all, std::vector<double>& excess) {
-  std::size_t k = 0;
-  io.list(all, [&](Judgement& j) {
-    if (io.reads()) excess.emplace_back();
-    io(j.judged, j.met, j.time, j.error, excess[k++]);
-    io.list(j.value, [&](double& x) { io(x); });
-    io.demand(j.value.size() <= 4);
-  });
-}
+using Q = Quantity;
+const std::map<Quantity, std::function<Value(const Seen&)>> kMeasures = {
+    value(Q::position, [](const Seen& s) { return s.body().position; }),
+    value(Q::velocity, [](const Seen& s) { return s.body().velocity; }),
+    value(Q::orientation, [](const Seen& s) { return s.body().orientation; }),
+    value(Q::angular_velocity, [](const Seen& s) { return s.body().angular_velocity; }),
+    value(Q::distance_moved,
+          [](const Seen& s) {
+            return (s.body().position - s.scene.bodies[s.index()].position).norm();
+          }),
+    value(Q::speed, [](const Seen& s) { return s.body().velocity.norm(); }),
+    value(Q::kinetic_energy, [](const Seen& s) { return s.d().kinetic_energy; }),
+    value(Q::potential_energy, [](const Seen& s) { return s.d().potential_energy; }),
+    value(Q::energy, [](const Seen& s) { return s.energy(); }),
+    value(Q::energy_change, [](const Seen& s) { return s.energy() - s.start_energy; }),
+    value(Q::momentum, [](const Seen& s) { return s.d().momentum; }),
+    value(Q::angular_momentum, [](const Seen& s) { return s.d().angular_momentum; }),
+    value(Q::drift, [](const Seen& s) { return s.d().drift; }),
+    value(Q::contacts, [](const Seen& s) { return double(s.d().contacts); }),
+    value(Q::penetration, [](const Seen& s) { return s.d().penetration; }),
+    value(Q::residual, [](const Seen& s) { return s.d().residual; }),
+    value(Q::contact_force, [](const Seen& s) { return s.contacts().first; }),
+    value(Q::contact_slip, [](const Seen& s) { return s.contacts().second; }),
+    value(Q::joint_force, [](const Seen& s) { return s.joint().force; }),
+    value(Q::joint_moment, [](const Seen& s) { return s.joint().moment; }),
+    value(Q::joint_drive, [](const Seen& s) { return s.joint().drive; }),
+    value(Q::spring_force, [](const Seen& s) {
+      return s.engine.forces().springs[static_cast<std::size_t>(s.expect.spring)].tension;
+    })};
 
 }  // namespace
 
 std::vector<Event> schedule(const Scene& scene, const std::vector<double>& stops) {
   std::vector<Event> all;
-  const auto add = [&](double time, bool Event::*reason) {
-    if (!(time > 0) || (time > scene.end && !same_time(time, scene.end))) return;
-    Event event;
-    event.time = time;
-    event.*reason = true;
-    all.push_back(event);
+  const auto add = [&](double time, Event::Reason reason) {
+    if (time > 0 && (time <= scene.end || same_time(time, scene.end)))
+      all.push_back({time, reason});
   };
-  const double every = scene.output.every > 0 ? scene.output.every : scene.end / 1000;
-  for (const double t : multiples(every, scene.end)) add(t, &Event::record);
-  if (scene.output.checkpoint > 0)
-    for (const double t : multiples(scene.output.checkpoint, scene.end)) add(t, &Event::checkpoint);
-  for (const Expect& expect : scene.expect) add(expect.time, &Event::expect);
-  for (const double t : stops) add(t, &Event::stop);
-  add(scene.end, &Event::end);
+  // k * every, k = 1, 2, ..., up to the end (to rounding).
+  const auto add_grid = [&](double every, Event::Reason reason) {
+    const double count = scene.end / every * (1 + kTimeRounding);
+    for (long k = 1; static_cast<double>(k) <= count; ++k)
+      add(static_cast<double>(k) * every, reason);
+  };
+  add_grid(scene.output.every > 0 ? scene.output.every : scene.end / 1000, Event::record);
+  if (scene.output.checkpoint > 0) add_grid(scene.output.checkpoint, Event::checkpoint);
+  for (const Expect& expect : scene.expect) add(expect.time, Event::expect);
+  for (const double t : stops) add(t, Event::stop);
+  add(scene.end, Event::end);
   std::stable_sort(all.begin(), all.end(),
                    [](const Event& a, const Event& b) { return a.time < b.time; });
   std::vector<Event> merged;
-  for (const Event& event : all)
-    if (merged.empty() || !same_time(merged.back().time, event.time))
+  for (const Event& event : all) {
+    if (merged.empty() || !same_time(merged.back().time, event.time)) {
       merged.push_back(event);
-    else
-      merge(event, merged.back());
+      continue;
+    }
+    Event& into = merged.back();
+    if (event.is(Event::record) && !into.is(Event::record)) into.time = event.time;
+    into.reasons |= event.reasons;
+  }
   return merged;
 }
 
 std::vector<double> measure(const Scene& scene, const Expect& expect, const Engine& engine,
                             double start_energy) {
-  const auto index = static_cast<std::size_t>(std::max(expect.body, 0));
-  const auto state = [&]() -> const BodyState& { return engine.bodies()[index]; };
-  const auto diagnostics = [&] { return engine.diagnostics(); };
-  const auto energy = [&] {
-    const Diagnostics d = engine.diagnostics();
-    return d.kinetic_energy + d.potential_energy;
-  };
-  const auto joint = [&] { return engine.forces().joints[static_cast<std::size_t>(expect.joint)]; };
-  switch (expect.quantity) {
-    case Quantity::position:
-      return three(state().position);
-    case Quantity::velocity:
-      return three(state().velocity);
-    case Quantity::orientation: {
-      const Eigen::Quaterniond& q = state().orientation;
-      return {q.w(), q.x(), q.y(), q.z()};
-    }
-    case Quantity::angular_velocity:
-      return three(state().angular_velocity);
-    case Quantity::distance_moved:
-      return {(state().position - scene.bodies[index].position).norm()};
-    case Quantity::speed:
-      return {state().velocity.norm()};
-    case Quantity::kinetic_energy:
-      return {diagnostics().kinetic_energy};
-    case Quantity::potential_energy:
-      return {diagnostics().potential_energy};
-    case Quantity::energy:
-      return {energy()};
-    case Quantity::energy_change:
-      return {energy() - start_energy};
-    case Quantity::momentum:
-      return three(diagnostics().momentum);
-    case Quantity::angular_momentum:
-      return three(diagnostics().angular_momentum);
-    case Quantity::drift:
-      return {diagnostics().drift};
-    case Quantity::contacts:
-      return {static_cast<double>(diagnostics().contacts)};
-    case Quantity::penetration:
-      return {diagnostics().penetration};
-    case Quantity::residual:
-      return {diagnostics().residual};
-    case Quantity::contact_force:
-      return three(contact_force(expect, engine));
-    case Quantity::contact_slip:
-      return {contact_slip(expect, engine)};
-    case Quantity::joint_force:
-      return three(joint().force);
-    case Quantity::joint_moment:
-      return three(joint().moment);
-    case Quantity::joint_drive:
-      return {joint().drive};
-    case Quantity::spring_force:
-      return {engine.forces().springs[static_cast<std::size_t>(expect.spring)].tension};
-  }
-  throw std::invalid_argument("unknown quantity");
+  return kMeasures.at(expect.quantity)({scene, expect, engine, start_energy});
 }
 
 Judge::Judge(const Scene& scene)
@@ -191,7 +157,7 @@ void Judge::judge(double event, bool record, const Engine& engine, double start_
     const Expect& expect = scene_.expect[i];
     const bool due = same_time(expect.time, event);
     if (!due && !(record && expect.throughout && event < expect.time)) continue;
-    const std::vector<double> value = measure(scene_, expect, engine, start_energy);
+    const Value value = measure(scene_, expect, engine, start_energy);
     double error = 0, excess = -kInfinity;
     const auto over = [&](double by) { excess = larger(excess, by); };
     if (!expect.value.empty()) {
@@ -213,17 +179,16 @@ void Judge::judge(double event, bool record, const Engine& engine, double start_
   }
 }
 
-void Judge::save(std::ostream& out) const {
+void Judge::exchange(binary::Archive io) {
   std::vector<Judgement> all = judgements_;
   std::vector<double> excess = excess_;
-  exchange(binary::Archive(out), all, excess);
-}
-
-void Judge::restore(std::istream& in) {
-  std::vector<Judgement> all;
-  std::vector<double> excess;
-  exchange(binary::Archive(in), all, excess);
-  // A scene may have gained or lost expectations: the judgements are kept only if none has.
+  std::size_t k = 0;
+  io.list(all, [&](Judgement& j) {
+    if (k == excess.size()) excess.emplace_back();
+    io(j.judged, j.met, j.time, j.error, excess[k++]);
+    io.list(j.value, [&](double& x) { io(x); });
+    io.demand(j.value.size() <= 4);
+  });
   if (all.size() != judgements_.size()) return;
   for (std::size_t i = 0; i < all.size(); ++i) all[i].beyond = judgements_[i].beyond;
   judgements_ = std::move(all);

@@ -4,16 +4,18 @@
 #include <cmath>
 #include <tether/scene/run.hpp>
 
+#include "output/binary.hpp"
+
 namespace tether::scene {
 
 /// One time, for one or several reasons.
 struct Event {
-  double time = 0;          // s
-  bool record = false;      // on the grid of Output::every
-  bool expect = false;      // of an [[expect]]
-  bool checkpoint = false;  // on the grid of Output::checkpoint
-  bool stop = false;        // of RunOptions::stops
-  bool end = false;
+  /// On the grid of Output::every, of an [[expect]], on the grid of Output::checkpoint, of
+  /// RunOptions::stops, the end.
+  enum Reason : unsigned { record = 1, expect = 2, checkpoint = 4, stop = 8, end = 16 };
+  double time = 0;  // s
+  unsigned reasons = 0;
+  bool is(unsigned any) const { return (reasons & any) != 0; }
 };
 
 /// Relative: nearer times are one, as 3 * 0.1 and 0.3.
@@ -33,14 +35,15 @@ class Judge {
   /// is one of those at which all that holds throughout is judged.
   void judge(double event, bool record, const Engine& engine, double start_energy);
   const std::vector<Judgement>& judgements() const { return judgements_; }
-  void save(std::ostream& out) const;
-  void restore(std::istream& in);
+  /// Reads judgements of a state, or writes them. A scene that has gained or lost expectations
+  /// begins anew.
+  void exchange(binary::Archive io);
 
  private:
   const Scene& scene_;
   std::vector<Judgement> judgements_;
-  std::vector<double>
-      excess_;  // by how much the worst moment missed its bound; <= 0: met, never nan
+  // By how much the worst moment missed its bound; <= 0: met, never nan.
+  std::vector<double> excess_;
 };
 
 }  // namespace tether::scene

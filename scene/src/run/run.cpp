@@ -101,10 +101,12 @@ class Run {
     result_.engine = engine_->name();
     if (plan_.engine == EngineKind::stepping)
       step_ = scene.stepping.value_or(SteppingOptions{}).step;
-    if (options.restart.empty())
-      start();
-    else
+    if (!options.restart.empty()) {
       restore(options.restart);
+    } else {
+      const Diagnostics d = engine_->diagnostics();
+      summary().start_energy = d.kinetic_energy + d.potential_energy;
+    }
     engine_->stop_when(options.interrupted);
     const formats::Beginning beginning{
         scene, plan_, resume_, options.among, summary().start_energy, engine_->time()};
@@ -115,19 +117,16 @@ class Run {
 
   RunResult go() {
     try {
-      if (!resume_.restarted) stop(at_start());
+      if (!resume_.time) stop({0, Event::record | Event::expect});
       if (is_over_ && options_.record) options_.record(*engine_);
       for (const Event& event : schedule(scene_, options_.stops)) {
         if (event.time <= done_ || same_time(event.time, done_)) continue;
         move(event.time);
         const bool there = engine_->time() >= event.time || !interrupted();
         if (there) stop(event);
-        if (!interrupted() || (event.end && there)) continue;
+        if (!interrupted() || (event.is(Event::end) && there)) continue;
         result_.interrupted = true;
-        Event here;
-        here.time = engine_->time();
-        here.end = true;
-        stop(here);
+        stop({engine_->time(), Event::end});
         break;
       }
     } catch (const SimulationError& e) {
@@ -160,17 +159,6 @@ class Run {
   Summary& summary() { return result_.summary; }
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
 
-  static Event at_start() {
-    Event event;
-    event.record = event.expect = true;
-    return event;
-  }
-
-  void start() {
-    const Diagnostics d = engine_->diagnostics();
-    summary().start_energy = d.kinetic_energy + d.potential_energy;
-  }
-
   void move(double time) {
     const Stopwatch watch;
     engine_->advance(time);
@@ -184,13 +172,14 @@ class Run {
   void stop(const Event& event) {
     diagnose();
     done_ = event.time;
-    if (event.record || event.expect)
-      judge_.judge(event.time, event.record, *engine_, summary().start_energy);
+    const bool on_grid = event.is(Event::record);
+    if (on_grid || event.is(Event::expect))
+      judge_.judge(event.time, on_grid, *engine_, summary().start_energy);
     if (options_.record) options_.record(*engine_);
-    if (event.record) record();
-    if ((event.checkpoint || event.end) && !scene_.output["state"].empty())
+    if (on_grid) record();
+    if (event.is(Event::checkpoint | Event::end) && !scene_.output["state"].empty())
       save(scene_.output["state"]);
-    if (event.end && !event.record) record();
+    if (event.is(Event::end) && !on_grid) record();
   }
 
   // Steps may be longer than the time between stops: no state is judged, or recorded, twice.
@@ -302,6 +291,7 @@ class Run {
     Summary& s = summary();
     io(done_, last_record_, s.start_energy, s.end_energy, s.lowest_change, s.largest_change,
        s.drift, s.penetration, s.residual, s.contacts, events);
+    judge_.exchange(io);
   }
 
   void save(const std::string& file) {
@@ -309,7 +299,6 @@ class Run {
     std::ostringstream out;
     std::uint64_t events = resume_.events + engine_->events().size();
     exchange(binary::Archive(out), events);
-    judge_.save(out);
     engine_->save(out);
     write_state(file, scene_hash_, out.str());
     saved_ = true;
@@ -319,10 +308,9 @@ class Run {
     const SavedState saved = read_state(file, scene_hash_, options_.force, options_.interrupted);
     if (!options_.force) return restore(file, saved.content, Engine::Restore::exact);
     try {
-      return restore(file, saved.content,
-                     saved.same ? Engine::Restore::exact : Engine::Restore::near);
+      return restore(file, saved.content, saved.how);
     } catch (const std::runtime_error&) {
-      if (!saved.same) throw;
+      if (saved.how == Engine::Restore::near) throw;
     }
     restore(file, saved.content, Engine::Restore::near);
   }
@@ -331,7 +319,6 @@ class Run {
     std::istringstream in(content);
     Summary& s = summary();
     exchange(binary::Archive(in), resume_.events);
-    judge_.restore(in);
     engine_->restore(in, how);
     if (in.peek() != std::char_traits<char>::eof())
       throw std::runtime_error("the saved state " + file + " is longer than this scene needs");
@@ -344,7 +331,6 @@ class Run {
     if (!(done_ >= 0 && last_record_ >= 0 && last_record_ <= time) ||
         !(done_ <= time || same_time(done_, time)))
       throw std::runtime_error("the saved state " + file + " is damaged: it is of no one time");
-    resume_.restarted = true;
     resume_.time = last_record_;
     recorded_ = true;
     is_over_ = same_time(done_, scene_.end);  // what it came to is judged once more
@@ -385,26 +371,19 @@ bool RunResult::met() const {
   return all_of(judgements, [](const Judgement& j) { return j.beyond || (j.judged && j.met); });
 }
 
-namespace {
-
-/// Laws that certificates do not tell.
-void refuse_uncertified(const Scene& scene) {
-  for (const Spring& each : scene.springs)
-    if (each.cable && each.cable->capstan)
-      throw std::invalid_argument("certificates do not know capstan friction, which cable \"" +
-                                  each.name + "\" has: run it without --certificate");
-  for (const Pair& each : scene.pairs)
-    if (each.static_friction)
-      throw std::invalid_argument("certificates do not know static_friction, which the pair of \"" +
-                                  each.first + "\" and \"" + each.second +
-                                  "\" has: run it without --certificate");
-}
-
-}  // namespace
-
 RunResult run(const Scene& scene, const RunOptions& options) {
   if (scene.output["certificate"].empty()) return Run(scene, options).go();
-  refuse_uncertified(scene);
+  const auto refuse = [](const std::string& law, const std::string& owner) {
+    throw std::invalid_argument(
+        fmt::format("certificates do not know {} has: run it without --certificate", law + owner));
+  };
+  for (const Spring& each : scene.springs)
+    if (each.cable && each.cable->capstan)
+      refuse("capstan friction, which cable \"", each.name + "\"");
+  for (const Pair& each : scene.pairs)
+    if (each.static_friction)
+      refuse("static_friction, which the pair of \"",
+             each.first + "\" and \"" + each.second + "\"");
   certificate::Sheet sheet(scene);
   Scene observed = scene;
   observed.certificate = &sheet;

@@ -93,7 +93,7 @@ SavedState read_state(const std::string& file, std::uint64_t scene, bool any_sce
                       const std::function<bool()>& interrupted) {
   const std::string bytes = all_of(file, interrupted);
   const std::size_t line = bytes.find('\n');
-  constexpr std::size_t kNumbers = 2 * sizeof(std::uint64_t), kCheck = sizeof(std::uint32_t);
+  constexpr std::size_t kNumbers = sizeof(std::uint64_t[2]), kCheck = sizeof(std::uint32_t);
   if (line == std::string::npos || bytes.size() < line + 1 + kNumbers + kCheck)
     throw std::runtime_error("the saved state " + file + " is cut off");
   const std::string_view sum = std::string_view(bytes).substr(0, bytes.size() - kCheck);
@@ -122,7 +122,8 @@ SavedState read_state(const std::string& file, std::uint64_t scene, bool any_sce
         "the saved state " + file +
         " is of another scene, or of another version of it: bodies, effects or options differ; "
         "--force goes on from its positions and velocities");
-  return {std::string(sum.substr(line + 1 + kNumbers)), same_version && of == scene};
+  return {std::string(sum.substr(line + 1 + kNumbers)),
+          same_version && of == scene ? Engine::Restore::exact : Engine::Restore::near};
 }
 
 }  // namespace tether::scene

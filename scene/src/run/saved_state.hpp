@@ -22,7 +22,7 @@ void write_state(const std::string& file, std::uint64_t scene, const std::string
 
 struct SavedState {
   std::string content;
-  bool same = true;  ///< scene and version
+  Engine::Restore how;  ///< exact: of the same scene and version
 };
 
 /// Throws std::runtime_error, naming the fault, on anything that write_state did not write, and on

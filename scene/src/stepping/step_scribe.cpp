@@ -11,23 +11,19 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSameTime = 1e-9;  // of a sub-step
-
-bool same(const BodyState& a, const BodyState& b) {
-  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs() &&
-         a.velocity == b.velocity && a.angular_velocity == b.angular_velocity;
-}
-
 bool same_place(const BodyState& a, const BodyState& b) {
   return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
 }
 
+bool same(const BodyState& a, const BodyState& b) {
+  return same_place(a, b) && a.velocity == b.velocity && a.angular_velocity == b.angular_velocity;
+}
+
 // Stages that are no forces.
 bool is_mechanism(std::string_view effect) {
-  for (const char* each :
-       {"joints", "contact", "restitution", "collision", "penetration", "motion"})
-    if (effect == each) return true;
-  return false;
+  return contains(std::array<std::string_view, 6>{"joints", "contact", "restitution", "collision",
+                                                  "penetration", "motion"},
+                  effect);
 }
 
 bool any(const std::vector<Vector3d>& impulses) {
@@ -41,7 +37,6 @@ StepScribe::StepScribe(const Scene& scene, contact::Stepper& stepper, certificat
       stepper_(stepper),
       sheet_(sheet),
       held_(scene.bodies.size(), 0),
-      extrapolates_(stepper.options().accuracy > 0),
       chain_(scene.bodies.size()) {
   for (const std::size_t i : scene.moving()) moving_.push_back(static_cast<int>(i));
   if (!scene.joints.empty()) joints_ = std::make_unique<SteppedJoints>(scene);
@@ -90,26 +85,26 @@ void StepScribe::begin_part(const contact::StepStage& stage) {
   take_states(begin_);
   last_ = solved_ = placed_ = begin_;
   pushes_.clear();
-  moved_ = false;
-  at_first_ = true;
+  phase_ = Phase::first;
   first_impulses_.clear();
   contacts_ = {};
 }
 
 void StepScribe::after_stage(const contact::StepStage& stage) {
   const std::string_view effect = stage.effect;
-  if (!moved_ && effect == "motion") {
-    moved_ = true;
+  const bool at_first = phase_ == Phase::first;
+  if (at_first) phase_ = Phase::solving;
+  if (phase_ == Phase::solving && effect == "motion") {
+    phase_ = Phase::moved;
     placed_ = last_;
     contacts_ = stepper_.contacts();
     as_solved_ = stage.solved;
   }
-  const bool puts_on_joints = at_first_ && effect == "joints";
-  at_first_ = false;
-  if (puts_on_joints) note_push("put onto joints");
-  if (!is_mechanism(effect) && (!moved_ || effect == "sleep")) note_push(stage.effect);
+  const bool moved = phase_ == Phase::moved;
+  if (at_first && effect == "joints") note_push("put onto joints");
+  if (!is_mechanism(effect) && (!moved || effect == "sleep")) note_push(stage.effect);
   take_states(last_);
-  if (!moved_ && effect != "penetration") solved_ = last_;
+  if (!moved && effect != "penetration") solved_ = last_;
   if (effect == "contact") first_impulses_ = stepper_.contacts().impulses;
 }
 
@@ -128,7 +123,7 @@ void StepScribe::note_push(const char* effect) {
 bool StepScribe::is_at(double time, const std::vector<int>& bodies) const {
   for (const int i : bodies) {
     const Reached& reached = chain_[at(i)];
-    if (std::abs(reached.time - time) > kSameTime * stepper_.options().step ||
+    if (std::abs(reached.time - time) > kSameBoundary * stepper_.options().step ||
         !same(reached.state, state(i)))
       return false;
   }
@@ -167,7 +162,7 @@ void StepScribe::explain(double time, const std::vector<int>& bodies) {
   for (const int i : bodies) part.before.push_back(chain_[at(i)]);
   if (reached(same_place) && any(stepper_.contacts().impulses)) {
     put_impact(part);
-  } else if (extrapolates_ && !parts_.empty() && !trial_.empty()) {
+  } else if (stepper_.options().accuracy > 0 && !parts_.empty() && !trial_.empty()) {
     for (std::string& each : trial_) {
       each.replace(0, 4, "trial");
       parts_.insert(parts_.begin() + static_cast<std::ptrdiff_t>(trial_at_++), Part());

@@ -6,6 +6,9 @@
 
 namespace tether::scene::stepping {
 
+/// A time so near, in steps, is that of a boundary up to rounding.
+constexpr double kSameBoundary = 1e-9;
+
 /// Observes the stages of each sub-step. A sub-step that the stepper takes back is known by the
 /// next one, which begins where that one began; an impact at which a step is cut, and what an
 /// accuracy extrapolates, by the next one, too, which begins elsewhere than the last one ended.
@@ -59,7 +62,6 @@ class StepScribe final : public certificate::Source {
   std::unique_ptr<SteppedJoints> joints_;  // null: none
   std::vector<int> moving_;
   std::vector<char> held_;      // bodies, by joints
-  bool extrapolates_;           // steps keep an accuracy
   long step_ = -1;              // that `parts_` belong to
   double began_ = 0;            // s
   std::vector<Reached> chain_;  // by body
@@ -71,7 +73,7 @@ class StepScribe final : public certificate::Source {
   std::vector<int> now_;                                   // bodies
   std::vector<BodyState> begin_, last_, solved_, placed_;  // by body; solved_: by contacts
   std::string pushes_;
-  bool moved_ = false, at_first_ = false;
+  enum class Phase : std::uint8_t { first, solving, moved } phase_ = Phase::first;
   std::vector<Eigen::Vector3d> first_impulses_;
   contact::StepContacts contacts_;
   std::vector<contact::PointContact> as_solved_;

@@ -127,8 +127,7 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 
 // The last letter is the format.
 constexpr binary::Magic kMagic = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '9'};
-// Parts of the step, and of the time: a time so near is that of a boundary up to rounding.
-constexpr double kSameBoundary = 1e-9, kRounding = 1e-15;
+constexpr double kRounding = 1e-15;  // of the time, beside kSameBoundary
 
 Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
   Mapped out = map_scene(scene);

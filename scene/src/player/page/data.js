@@ -52,26 +52,15 @@ function posesAt(data, time, poses) {
   const span = data.times[b] - data.times[a];
   const share = span > 0 ? Math.min(1, Math.max(0, (time - data.times[a]) / span)) : 0;
   data.bodies.forEach((body, i) => {
-    const out = 7 * i;
-    if (body.film === null) {
-      for (let k = 0; k < 3; ++k) poses[out + k] = body.position[k];
-      for (let k = 0; k < 4; ++k) poses[out + 3 + k] = body.orientation[k];
-      return;
-    }
-    const pa = 3 * (a * data.moving + body.film), pb = 3 * (b * data.moving + body.film);
-    for (let k = 0; k < 3; ++k)
-      poses[out + k] = data.positions[pa + k] + share * (data.positions[pb + k] - data.positions[pa + k]);
-    const qa = 4 * (a * data.moving + body.film), qb = 4 * (b * data.moving + body.film);
-    let dot = 0, square = 0;
-    for (let k = 0; k < 4; ++k) dot += data.orientations[qa + k] * data.orientations[qb + k];
-    const sign = dot < 0 ? -1 : 1;
-    for (let k = 0; k < 4; ++k) {
-      const q = (1 - share) * data.orientations[qa + k] + share * sign * data.orientations[qb + k];
-      poses[out + 3 + k] = q;
-      square += q * q;
-    }
-    const norm = Math.sqrt(square) || 1;
-    for (let k = 0; k < 4; ++k) poses[out + 3 + k] /= norm;
+    const out = poses.subarray(7 * i, 7 * i + 7);
+    if (body.film === null) return out.set([...body.position, ...body.orientation]);
+    const of = (numbers, size, frame) => numbers.subarray(size * (frame * data.moving + body.film)).subarray(0, size);
+    const pa = of(data.positions, 3, a), pb = of(data.positions, 3, b), qa = of(data.orientations, 4, a), qb = of(data.orientations, 4, b);
+    for (let k = 0; k < 3; ++k) out[k] = pa[k] + share * (pb[k] - pa[k]);
+    const sign = qa.reduce((sum, x, k) => sum + x * qb[k], 0) < 0 ? -1 : 1;
+    for (let k = 0; k < 4; ++k) out[3 + k] = (1 - share) * qa[k] + share * sign * qb[k];
+    const norm = Math.hypot(out[3], out[4], out[5], out[6]) || 1;
+    for (let k = 3; k < 7; ++k) out[k] /= norm;
   });
   return a;
 }

@@ -77,12 +77,19 @@ class Renderer {
     }
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-    const uniforms = {};
+    const setters = { [gl.FLOAT]: 'uniform1f', [gl.FLOAT_VEC2]: 'uniform2fv', [gl.FLOAT_VEC3]: 'uniform3fv', [gl.FLOAT_VEC4]: 'uniform4fv',
+      [gl.INT]: 'uniform1i', [gl.BOOL]: 'uniform1i' }, places = {};
     for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); ++i) {
-      const { name } = gl.getActiveUniform(program, i);
-      uniforms[name] = gl.getUniformLocation(program, name);
+      const { name, type } = gl.getActiveUniform(program, i);
+      places[name] = [gl.getUniformLocation(program, name), setters[type]];
     }
-    return { program, uniforms };
+    return uniforms => {
+      gl.useProgram(program);
+      for (const [name, value] of Object.entries(uniforms)) {
+        const [place, setter] = places[name];
+        if (setter) gl[setter](place, value); else gl.uniformMatrix4fv(place, false, value);
+      }
+    };
   }
   mesh(form) {
     const gl = this.gl, vertices = gl.createVertexArray();
@@ -104,18 +111,13 @@ class Renderer {
     });
     return { vertices, instances, count: form.corners.length };
   }
-  upload(instances) {
+  // `fresh`: they have changed since they were drawn last.
+  draw(instances, fresh) {
     const gl = this.gl;
     instances.forms.forEach((form, f) => {
       if (form.count === 0) return;
       gl.bindBuffer(gl.ARRAY_BUFFER, this.meshes[f].instances);
-      gl.bufferData(gl.ARRAY_BUFFER, form.numbers.subarray(0, 14 * form.count), gl.DYNAMIC_DRAW);
-    });
-  }
-  draw(instances) {
-    const gl = this.gl;
-    instances.forms.forEach((form, f) => {
-      if (form.count === 0) return;
+      if (fresh) gl.bufferData(gl.ARRAY_BUFFER, form.numbers.subarray(0, 14 * form.count), gl.DYNAMIC_DRAW);
       gl.bindVertexArray(this.meshes[f].vertices);
       gl.drawElementsInstanced(gl.TRIANGLES, this.meshes[f].count, gl.UNSIGNED_INT, 0, form.count);
     });
@@ -130,62 +132,39 @@ class Renderer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    gl.useProgram(this.solid.program);
-    const { uniforms } = this.solid;
-    gl.uniformMatrix4fv(uniforms.view, false, matrix);
-    gl.uniform3fv(uniforms.light, light);
-    gl.uniform3fv(uniforms.towards, towards);
-    gl.uniform1i(uniforms.shadow, 0);
-    gl.uniform1i(uniforms.mode, 0);
+    this.solid({ view: matrix, light, towards, shadow: 0, mode: 0 });
     gl.enable(gl.CULL_FACE);
-    this.upload(shapes.solid);
-    this.draw(shapes.solid);
+    this.draw(shapes.solid, true);
     gl.disable(gl.CULL_FACE);
     gl.enable(gl.BLEND);
     gl.depthMask(false);
     for (const plane of planes) this.drawPlane(plane, matrix, camera);
-    gl.useProgram(this.solid.program);
     if (shadows) for (const plane of planes) if (plane.shaded) this.drawShadows(shapes, plane, camera);
     gl.depthMask(true);
     gl.disable(gl.BLEND);
-    gl.uniform1i(uniforms.mode, 0);
-    gl.uniform1i(uniforms.shadow, 0);
+    this.solid({ light, shadow: 0, mode: 0 });
     gl.clear(gl.DEPTH_BUFFER_BIT);
-    this.upload(shapes.above);
-    this.draw(shapes.above);
+    this.draw(shapes.above, true);
   }
-  drawPlane(plane, matrix, camera) {
-    const gl = this.gl, { uniforms } = this.plane;
-    gl.useProgram(this.plane.program);
+  drawPlane({ middle, first, second, normal, origin, edge, cell }, matrix, camera) {
+    const gl = this.gl, above = dotted(subtract(camera.eye(), middle), normal) > 0;
+    this.plane({ view: matrix, middle, first, second, half_edge: edge, origin, cell, strength: above ? 1 : 0.3 });
     gl.bindVertexArray(this.empty);
-    gl.uniformMatrix4fv(uniforms.view, false, matrix);
-    gl.uniform3fv(uniforms.middle, plane.middle);
-    gl.uniform3fv(uniforms.first, plane.first);
-    gl.uniform3fv(uniforms.second, plane.second);
-    gl.uniform1f(uniforms.half_edge, plane.edge);
-    gl.uniform2fv(uniforms.origin, plane.origin);
-    gl.uniform1f(uniforms.cell, plane.cell);
-    const above = dotted(subtract(camera.eye(), plane.middle), plane.normal) > 0;
-    gl.uniform1f(uniforms.strength, above ? 1 : 0.3);
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1, 1);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     gl.disable(gl.POLYGON_OFFSET_FILL);
   }
   // The stencil darkens a pixel once.
-  drawShadows(shapes, plane, camera) {
-    const gl = this.gl, { uniforms } = this.solid;
-    if (dotted(subtract(camera.eye(), plane.middle), plane.normal) <= 0) return;
-    gl.uniform1i(uniforms.shadow, 1);
-    gl.uniform1i(uniforms.mode, 1);
-    gl.uniform3fv(uniforms.light, unit(add(plane.normal, scaled(camera.front, -0.15))));
-    gl.uniform4f(uniforms.ground, ...plane.normal, dotted(plane.normal, plane.middle));
+  drawShadows(shapes, { middle, normal }, camera) {
+    const gl = this.gl;
+    if (dotted(subtract(camera.eye(), middle), normal) <= 0) return;
+    this.solid({ shadow: 1, mode: 1, light: unit(add(normal, scaled(camera.front, -0.15))), ground: [...normal, dotted(normal, middle)] });
     gl.enable(gl.STENCIL_TEST);
     gl.stencilFunc(gl.EQUAL, 0, 0xff);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
-    this.draw(shapes.solid);
+    this.draw(shapes.solid, false);
     gl.disable(gl.STENCIL_TEST);
-    gl.uniform3fv(uniforms.light, unit(camera.up));
   }
   // The body drawn at a pixel of the canvas, -1: none. Its number is drawn as a colour.
   bodyAt(shapes, camera, x, y) {
@@ -200,11 +179,8 @@ class Renderer {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.useProgram(this.solid.program);
-    gl.uniformMatrix4fv(this.solid.uniforms.view, false, camera.matrix(canvas.width / canvas.height));
-    gl.uniform1i(this.solid.uniforms.mode, 2);
-    this.upload(shapes.solid);
-    this.draw(shapes.solid);
+    this.solid({ view: camera.matrix(canvas.width / canvas.height), shadow: 0, mode: 2 });
+    this.draw(shapes.solid, true);
     const pixel = new Uint8Array(4);
     gl.readPixels(x, canvas.height - 1 - y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     shapes.solid.forms.forEach((form, f) => form.numbers.set(colours[f]));

@@ -28,18 +28,17 @@ function triangles(form) {
   return { positions, normals, corners, round: form.round };
 }
 
-// A frustum of height 1 along z from the origin, for rods (both radii 1) and heads of arrows.
-function frustum(bottom, top) {
-  const around = 12, points = [], faces = [[], []];
-  for (let k = 0; k < around; ++k) {
-    const c = Math.cos(2 * Math.PI * k / around), s = Math.sin(2 * Math.PI * k / around);
-    points.push([bottom * c, bottom * s, 0], [top * c, top * s, 1]);
-    const next = (k + 1) % around;
-    faces.push([2 * k, 2 * next, 2 * next + 1, 2 * k + 1]);
-    faces[0].unshift(2 * k);
-    faces[1].push(2 * k + 1);
-  }
-  return { points, faces, round: false };
+// A surface around z by its rings, [radius, height] each, from below.
+function lathe(rings, round) {
+  const around = 12, points = [], faces = [];
+  rings.forEach(([radius, height], r) => {
+    for (let k = 0; k < around; ++k) {
+      const angle = 2 * Math.PI * k / around, at = r * around + k, next = r * around + (k + 1) % around;
+      points.push([radius * Math.cos(angle), radius * Math.sin(angle), height]);
+      if (r + 1 < rings.length) faces.push([at, next, next + around, at + around]);
+    }
+  });
+  return { points, faces, round };
 }
 
 // Instances of each form: 14 numbers each (position, quaternion, scale, colour, pattern). Bodies
@@ -71,25 +70,13 @@ class Shapes {
     this.data = data;
     this.forms = data.forms.map(triangles);
     const extra = form => this.forms.push(triangles(form)) - 1;
-    this.ball = extra(this.ballForm());
-    this.rod = extra(frustum(1, 1));
-    this.head = extra(frustum(1, 0));
+    this.ball = extra(lathe([0, 1, 2, 3, 4, 5, 6, 7].map(r => [Math.sin(Math.PI * r / 7), -Math.cos(Math.PI * r / 7)]), true));
+    this.rod = extra(lathe([[0, 0], [1, 0], [1, 1], [0, 1]], false));
+    this.head = extra(lathe([[0, 0], [1, 0], [0, 1]], false));  // of an arrow
     this.solid = new Instances(this.forms);
     this.above = new Instances(this.forms);  // drawn over all bodies
     this.marker = reach > 0 ? Math.max(0.002 * size, Math.min(0.009 * size, 0.12 * reach)) : 0.009 * size;
     this.reach = 14 * this.marker;  // of the arrow of a large impulse
-  }
-  ballForm() {
-    const points = [], faces = [], around = 12, rings = 7;
-    for (let r = 0; r <= rings; ++r)
-      for (let k = 0; k < around; ++k) {
-        const a = Math.PI * r / rings, b = 2 * Math.PI * k / around;
-        points.push([Math.sin(a) * Math.cos(b), Math.sin(a) * Math.sin(b), -Math.cos(a)]);
-        if (r === rings) continue;
-        const next = (k + 1) % around;
-        faces.push([r * around + k, r * around + next, (r + 1) * around + next, (r + 1) * around + k]);
-      }
-    return { points, faces, round: true };
   }
   colour(b) { return this.data.bodies[b].film === null ? kFixed : kColours[b % kColours.length]; }
 

@@ -1,14 +1,9 @@
 // Tether: `tether cost`: what accuracy costs in time. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/core.h>
-#include <fmt/format.h>
 
 #include <progress.hpp>
 #include <tether/scene/cost.hpp>
 
-#include "output/files.hpp"
 #include "program/commands.hpp"
-#include "program/process.hpp"
-#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -66,19 +61,6 @@ void check_settings(const Scene& scene, const CostArguments& arguments) {
                                 "): use --time-steps");
 }
 
-// Files that would be lost are told before the work.
-void check_files(const Scene& scene, const CostArguments& arguments) {
-  Output files;
-  files["csv"] = arguments.csv;
-  files["svg"] = arguments.svg;
-  files["html"] = arguments.html;
-  formats::check_names(files, inputs_of(scene));
-  for (const std::string& file : formats::names(files)) {
-    if (!arguments.force) check_replaceable(file);
-    check_writable(file);
-  }
-}
-
 int run_cost(const CostArguments& arguments) {
   const Scene scene = read_scene(arguments.file);
   check_settings(scene, arguments);
@@ -89,7 +71,11 @@ int run_cost(const CostArguments& arguments) {
   options.reference = arguments.reference;
   options.interrupted = [] { return caught_signal() != 0; };
   catch_signals();
-  check_files(scene, arguments);
+  Output files;
+  files["csv"] = arguments.csv;
+  files["svg"] = arguments.svg;
+  files["html"] = arguments.html;
+  check_outputs(files, inputs_of(scene), arguments.force);
   std::optional<tether::Progress> bar;
   options.progress = [&](const std::string& what, int done, int all) {
     if (done == 0)

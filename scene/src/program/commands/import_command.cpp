@@ -1,16 +1,8 @@
 // Tether: `tether import`: robots of other programs as scenes. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <fmt/core.h>
-
-#include <CLI/CLI.hpp>
-#include <cmath>
-#include <fstream>
-#include <iostream>
 
 #include "import/import.hpp"
-#include "output/files.hpp"
 #include "program/commands.hpp"
-#include "record/formats.hpp"
 
 namespace tether::scene {
 

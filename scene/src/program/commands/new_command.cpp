@@ -1,15 +1,11 @@
 // Tether: `tether new`: writes a scene to start from. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/core.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
-#include "output/files.hpp"
 #include "program/commands.hpp"
-#include "program/process.hpp"
 
 namespace tether::scene {
 

@@ -1,15 +1,11 @@
 // Tether: `tether run`: moves a scene. SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/core.h>
 
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <progress.hpp>
 
 #include "program/commands.hpp"
-#include "program/process.hpp"
 #include "program/ranks/ranks.hpp"
-#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -78,22 +74,6 @@ void overlay(const RunArguments& arguments, Scene& scene) {
 void write_film_alone(Output& o) {
   for (const formats::Format* each : formats::all())
     if (!each->film) o[each->name].clear();
-}
-
-/// `shared`: a line behind the summary, or nothing.
-void report(const Scene& scene, const RunResult& result, const std::string& shared,
-            double seconds) {
-  print_summary(scene, result);
-  fmt::print("{}", shared);
-  print_times(result, seconds);
-  print_judgements(scene, result);
-  print_files(result);
-  if (result.interrupted)
-    fmt::print("interrupted at {:.9g} s of {:g} s{}\n", result.time, scene.end,
-               scene.output["state"].empty()
-                   ? ""
-                   : fmt::format("; to go on: --restart {}", scene.output["state"]));
-  std::fflush(stdout);
 }
 
 /// ranks: processes that make the same run, null: there is one.

@@ -1,19 +1,13 @@
 // Tether: `tether sweep`: runs a scene over ranges of its numbers. SPDX-License-Identifier:
 // BSD-3-Clause
-#include <fmt/core.h>
-#include <fmt/format.h>
 
-#include <algorithm>
 #include <progress.hpp>
 #include <tether/scene/words.hpp>
 #include <thread>
 
 #include "bounds.hpp"
 #include "lists.hpp"
-#include "output/files.hpp"
 #include "program/commands.hpp"
-#include "program/process.hpp"
-#include "record/formats.hpp"
 
 namespace tether::scene {
 
@@ -130,9 +124,7 @@ int sweep(const SweepArguments& arguments) {
     table["csv"] = arguments.out;
     std::vector<std::string> inputs = plain.surface_files;
     if (arguments.file != "-") inputs.push_back(arguments.file);
-    formats::check_names(table, inputs);
-    if (!arguments.force) check_replaceable(arguments.out);
-    check_writable(arguments.out);
+    check_outputs(table, inputs, arguments.force);
   }
   StandardOutput output(arguments.out);
   tether::Progress bar(1);
