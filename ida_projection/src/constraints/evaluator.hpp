@@ -66,7 +66,7 @@ constexpr double kInvolved = 1e-3;  ///< of a kept row in a dropped one, to be n
 /// Tolerances beyond the kept rows: a dropped one that asks for more contradicts them.
 constexpr double kContradicts = 0.5;
 
-/// What rows say where they do not succeed.
+/// The reason why rows did not succeed.
 struct RowsReport {
   std::string text;
   std::vector<int> rows;  ///< that contradict each other

@@ -43,15 +43,115 @@ class ContiguousRows final : public RowsAt {
         g_(static_cast<std::size_t>(evaluator_.rows()), 0.0),
         kept_g_(g_) {}
 
-  Status load(const Candidate& candidate, bool refills) override;
-  Status value(double t, bool with_rows) override;
-  Status factor(double t, bool refill) override;
-  Solution solve(Solve how) override;
-  Status apply(double share, const Candidate& candidate) override;
-  bool is_rounding(double move) override;
+  Status load(const Candidate& candidate, bool refills) override {
+    place(candidate);
+    if (!refills) metric_.find(at_);
+    decided_ = moved_ = false;
+    return rows_.structured() ? Status::success : structure(candidate.t, nullptr);
+  }
+  Status value(double t, bool with_rows) override {
+    const bool both = with_rows && evaluator_.gives_both();
+    const Status status =
+        both ? rows(t, g_.data()) : evaluator_.value(t, y_.data(), unknowns(), g_.data());
+    rows_known_ = both && status == Status::success;
+    drift = 0.0;
+    for (std::size_t i = 0; i < reported_; ++i) drift = std::max(drift, std::abs(g_[i]));
+    return status;
+  }
+  Status factor(double t, bool refill) override {
+    if (refill) fill_metric();
+    if (!rows_known_) {
+      const Status status = rows(t, nullptr);
+      if (status != Status::success) return status;
+    }
+    rows_known_ = false;
+    t_ = t;
+    const bool known = in_use(Mechanism::kept_rank) && lasting_ && factors != Factors::none;
+    if (!known || !rows_.factor_kept()) return decide(t);
+    thin_ = false;
+    ++statistics_.refactorizations;
+    return Status::success;
+  }
+  Solution solve(Solve how) override {
+    Solution found;
+    rows_.solve(g_);
+    if (how == Solve::point) {  // C of another point says nothing about its thin rows
+      thin_ = lasting_ = false;
+      double sum = 0.0;
+      rows_.for_moves([&](int j, double move) { sum += square(move * at_.weight_entries[j]); });
+      found.length = wrms(sum);
+      found.rank = rows_.rank();
+      return found;
+    }
+    if (how != Solve::test) ++statistics_.iterations;
+    found.length = length_of_solution();
+    if (how == Solve::first && thin_) {
+      found.length = judge_thin_rows(found.length);
+      if (!moved_ && rows_.trust.must_learn(found.length)) {
+        // The move of the firm rows shows how C turns. Then all rows are judged at the start of the
+        // move.
+        rows_.for_moves([this](int j, double move) { y_[static_cast<std::size_t>(j)] -= move; });
+        found.status = learn_trust(found.length);
+        place(at_);
+        if (found.status == Status::success) found.status = factor(t_, false);
+        if (found.status != Status::success) return found;
+        rows_.solve(g_);
+        found.length = judge_thin_rows(length_of_solution());
+      }
+    }
+    if (how != Solve::rest && !dropped_follow()) {
+      lasting_ = false;
+      if ((found.status = factor(t_, false)) != Status::success) return found;
+      rows_.solve(g_);
+      found.length = length_of_solution();
+      if (thin_) found.length = judge_thin_rows(found.length);
+      (void)dropped_follow();  // notes what they ask for now
+    }
+    length_ = found.length;
+    return found;
+  }
+  Status apply(double share, const Candidate& candidate) override {
+    double* const correction = candidate.correction_entries;
+    const bool learns = thin_ && !moved_ && share == 1.0;
+    moved_ = true;
+    rows_.for_blocks([&](const Block& block) {
+      if (block.first >= 0)
+        take(share, block.dy.data(), static_cast<int>(block.columns.size()),
+             correction + block.first, y_.data() + block.first);
+      else
+        block.for_columns([=, y = y_.data(), dy = block.dy.data()](int k, int i) {
+          correction[i] -= share * dy[k];
+          y[i] -= share * dy[k];
+        });
+    });
+    return learns ? learn_trust(length_) : Status::success;
+  }
+  bool is_rounding(double move) override {
+    if (std::isfinite(move)) return move <= rounding_length();
+    for (std::size_t i = 0; i < g_.size(); ++i)
+      if (!(std::abs(g_[i]) <= kRoundingOfTerms * rows_.C().terms(static_cast<int>(i), y_.data())))
+        return false;
+    return true;
+  }
 
-  double follow(const Candidate& candidate, N_Vector change) override;
-  double corrected() const override;
+  double follow(const Candidate& candidate, N_Vector change) override {
+    if (change == nullptr) {
+      place(candidate);
+      return 0.0;
+    }
+    const double *e = N_VGetArrayPointer(change), *w = at_.weight_entries;
+    double* y = y_.data();
+    for (int i = 0, n = unknowns(); i < n; ++i) y[i] += e[i];
+    double sum = 0.0;
+    rows_.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
+    return wrms(sum);
+  }
+  double corrected() const override {
+    double sum = 0.0;
+    rows_.d.for_columns(
+        [&](int, int j) { sum += square(at_.correction_entries[j] * at_.weight_entries[j]); });
+    return wrms(sum);
+  }
   bool contradicts() override { return rows_.drops_rows() && rows_.contradict(WT()); }
   void refresh_pattern_soon() override { rows_.refresh_pattern_soon(); }
 
@@ -59,10 +159,6 @@ class ContiguousRows final : public RowsAt {
     place(candidate);
     id_ = id;
     return structure(candidate.t, id);
-  }
-  bool metric(N_Vector D) const override {
-    std::copy(metric_.D().begin(), metric_.D().end(), N_VGetArrayPointer(D));
-    return factors != Factors::none;
   }
   void accept() override { metric_.accept(); }
   void reset() override {
@@ -73,21 +169,89 @@ class ContiguousRows final : public RowsAt {
     decisions_ = 0;
     levels_.reset();
   }
-  bool use_levels(bool on) override;
+  bool use_levels(bool on) override {
+    if (on && levels().empty()) return false;
+    metric_.use_levels(on ? levels() : std::vector<int>());
+    factors = Factors::none;
+    return true;
+  }
   // Few rows make no rough moves. At singular positions, where rows are nearly dependent, F
   // responds to any move, stiff or not.
   bool may_use_levels() const override {
     return count() > kFew && factors != Factors::of_some_rows;
   }
-  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override;
+  bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override {
+    if (!rows_.structured() || factors == Factors::none) return false;
+    for (std::vector<double>* each : {&out.rate, &out.terms, &out.tolerance, &out.size})
+      each->resize(reported_);
+    for (std::size_t i = 0; i < reported_; ++i) {
+      double rate = 0.0, terms = 0.0, sum = 0.0, size = 0.0;
+      bool algebraic = false;
+      rows_.C().visit(static_cast<int>(i), [&](int j, double c) {
+        const auto k = static_cast<std::size_t>(j);
+        const bool differential = id == nullptr || id[j] != 0.0;
+        algebraic = algebraic || (c != 0.0 && !differential);
+        rate += c * yp[k];
+        terms += std::abs(c * yp[k]);
+        if (differential) size += std::abs(c) * std::max(1.0, std::abs(y_[k]));
+        sum += at_.weight_entries[k] > 0.0 ? square(c / at_.weight_entries[k]) : 0.0;
+      });
+      out.rate[i] = rate;
+      out.size[i] = size;
+      out.terms[i] = algebraic ? -1.0 : terms;
+      out.tolerance[i] = std::sqrt(sum);
+    }
+    return true;
+  }
 
   int count() const override { return evaluator_.rows(); }
   Status value_at(double t, N_Vector y, std::vector<double>& g) override {
     return evaluator_.value(t, N_VGetArrayPointer(y), unknowns(), g.data());
   }
-  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id) override;
-  Status factor_in(N_Vector D) override;
-  Status product(N_Vector s, std::vector<double>& r) override;
+  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id) override {
+    t_ = t;
+    at_.weight_entries = N_VGetArrayPointer(weights);
+    std::copy_n(N_VGetArrayPointer(y), y_.size(), y_.begin());
+    const bool arranged = std::exchange(id_, id) == id && rows_.structured();
+    if (!arranged) {
+      const Status status = structure(t, id);
+      if (status != Status::success) return status;
+    }
+    return rows_.evaluate(t, y_.data(), WT().data(), nullptr, [this] { factors = Factors::none; });
+  }
+  Status factor_in(N_Vector D) override {
+    rows_.set_metric(N_VGetArrayPointer(D));
+    if (factors == Factors::of_all_rows && rows_.factor_kept()) {
+      ++statistics_.refactorizations;
+      return Status::success;
+    }
+    const Status status = decide(t_);
+    if (status == Status::success && !rows_.C().sparse())
+      rows_.for_blocks(
+          [](Block& block) { block.dense.use_rank(RowTrust::firm_rows(block.dense)); });
+    return status;
+  }
+  // A C by differences is good for Newton's moves only: C s by those of g along s, of fourth order.
+  Status product(N_Vector s, std::vector<double>& r) override {
+    const double* along = N_VGetArrayPointer(s);
+    if (!evaluator_.uses_differences()) {
+      for (int i = 0; i < count(); ++i) r[static_cast<std::size_t>(i)] = rows_.C().times(i, along);
+      return Status::success;
+    }
+    double largest_s = 0.0, largest_y = 0.0;
+    for (std::size_t j = 0; j < y_.size(); ++j) {
+      largest_s = std::max(largest_s, std::abs(along[j]));
+      largest_y = std::max({largest_y, std::abs(y_[j]), WT_[j]});
+    }
+    std::fill(r.begin(), r.end(), 0.0);
+    if (largest_s == 0.0) return Status::success;
+    std::vector<double> at(y_);
+    const double d = kAlong * (largest_y > 0.0 ? largest_y : 1.0) / largest_s;
+    return central_differences(d, r, g_, [&](double e, std::vector<double>& g) {
+      for (std::size_t j = 0; j < y_.size(); ++j) at[j] = y_[j] + e * along[j];
+      return evaluator_.value(t_, at.data(), unknowns(), g.data());
+    });
+  }
   void solve_for(const std::vector<double>& r, N_Vector ds) override {
     rows_.solve(r);
     N_VConst(0.0, ds);
@@ -114,21 +278,145 @@ class ContiguousRows final : public RowsAt {
     return WT_;
   }
 
-  Status structure(double t, N_Vector id);
-  Status rows(double t, double* g);
-  Status decide(double t);
-  double length_of_solution();
-  double length_with(int rank);
-  double judge_thin_rows(double length);
-  bool dropped_follow();
+  Status structure(double t, N_Vector id) {
+    factors = Factors::none;
+    levels_.reset();
+    const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
+    return rows_.structure(t, y_, WT(), options_.hold, mask);
+  }
+  // C at the present y, and g if wanted. Only differences and mixed rows need the size of a
+  // tolerance.
+  Status rows(double t, double* g) {
+    return rows_.evaluate(t, y_.data(), rows_.needs_WT() ? WT().data() : nullptr, g, [this] {
+      factors = Factors::none;
+      levels_.reset();
+      fill_metric();
+    });
+  }
+  // Factors that show which rows are independent.
+  Status decide(double t) {
+    factors = Factors::none;
+    ++statistics_.factorizations;
+    find_rates();
+    if (!rows_.factor()) {
+      report.text = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t);
+      return Status::not_finite;
+    }
+    const bool drops = rows_.drops_rows();
+    if (drops) ++statistics_.rank_drops;
+    thin_ = in_use(Mechanism::row_trust) && !rows_.C().sparse() &&
+            RowTrust::has_thin_rows(rows_.counted().dense);
+    lasting_ = !thin_;
+    decided_ = true;
+    factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
+    return Status::success;
+  }
+  // Algebraic columns do not count: they follow the others, and are not in the error test.
+  double length_of_solution() {
+    double sum = 0.0;
+    const Block& block = rows_.counted();
+    block.for_columns([&sum, dy = block.dy.data(), w = at_.weight_entries](int k, int i) {
+      const double move = dy[k] * w[i];
+      sum += move * move;
+    });
+    return wrms(sum);
+  }
+  double length_with(int rank) {
+    rows_.counted().dense.use_rank(rank);
+    rows_.solve(g_);
+    return length_of_solution();
+  }
+  // After a solution of this length with all rows: decides which thin rows take part until the next
+  // factorisation. Returns the length of the solution with those. Firm rows do not magnify their
+  // right-hand side.
+  double judge_thin_rows(double length) {
+    linalg::MinimumNorm& solver = rows_.counted().dense;
+    const int all = solver.rank(), firm = RowTrust::firm_rows(solver);
+    if (rows_.trust.trusted_rows(solver, length) == all) return length;
+    const bool whole = !rows_.drops_rows();
+    const double firm_length = length_with(firm);
+    solver.use_rank(all);
+    const int trusted = rows_.trust.trusted_rows(solver, firm_length);
+    solver.use_rank(trusted);
+    lasting_ = RowTrust::lasting(solver, firm, trusted);
+    if (whole && trusted < all) ++statistics_.rank_drops;
+    return trusted > firm ? length_with(trusted) : firm_length;
+  }
+  // After a solution: whether the dropped rows follow from the kept ones. They are satisfied only
+  // while they depend on these. If they ask for a longer move than when they were dropped, one of
+  // them may have become independent.
+  bool dropped_follow() {
+    if (rows_.C().sparse() || !rows_.drops_rows()) return true;
+    const double left = rows_.left_of_dropped(WT());
+    if (decided_) usual_ = left;
+    return decided_ || left <= std::max(kFollows * options_.advanced.tolerance, 2.0 * usual_) ||
+           left <= 1e2 * kEpsilon * N_VWrmsNorm(at_.base, at_.weights);
+  }
   Status learn_trust(double length) {
     const double* tolerances = evaluator_.uses_differences() ? WT().data() : nullptr;
     return rows_.learn_trust(t_, y_.data(), tolerances, length);
   }
-  const std::vector<int>& levels();
-  void find_rates();
-  bool first_are_rates_of_zeroth(const std::vector<int>& levels);
-  double rounding_length();
+  // Level of each unknown in the rows that are measured in tolerances; empty if there is one level.
+  // Structural entries count, also those that are zero now: at rest the entries of positions in
+  // rows of velocities are.
+  const std::vector<int>& levels() {
+    if (levels_) return *levels_;
+    levels_ = levels_of_columns(rows_.C().pattern(rows_.d.rows));
+    if (*std::max_element(levels_->begin(), levels_->end()) < 1) levels_->clear();
+    return *levels_;
+  }
+  void find_rates() {
+    if (!in_use(Mechanism::rate_limit) || at_.predicted_rate == nullptr || metric_.by_rates() ||
+        options_.advanced.metric != Metric::local_correction || ++decisions_ > kEarly)
+      return;
+    const std::vector<int>& found = levels();
+    if (found.empty() || !first_are_rates_of_zeroth(found)) return;
+    metric_.use_rates(found);
+    fill_metric();
+  }
+  // Whether levels 0 and 1 have equally many unknowns and rows, and unknowns and rates are of equal
+  // size. An energy is one row more.
+  bool first_are_rates_of_zeroth(const std::vector<int>& levels) {
+    double rates = 0.0, values = 0.0;
+    int more = 0, more_rows = 0;
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      if (levels[i] == 0) {
+        rates += square(at_.predicted_rate[i] + at_.cj * at_.correction_entries[i]);
+        ++more;
+      } else if (levels[i] == 1) {
+        values += square(y_[i]);
+        --more;
+      }
+    }
+    for (const int i : rows_.d.rows) {
+      int level = -1;
+      rows_.C().visit(i, [&](int j, double entry) {
+        if (entry != 0.0) level = std::max(level, levels[static_cast<std::size_t>(j)]);
+      });
+      more_rows += level == 0 ? 1 : level == 1 ? -1 : 0;
+    }
+    return more == 0 && more_rows == 0 && values > 0.0 &&
+           std::abs(rates - values) <= kAlike * values;
+  }
+  // Length of the move that the rounding of g asks for in the worst case, with the current factors:
+  // at most sum_i |dy_i|, dy_i the move for row i alone, and so sqrt(m sum_i |dy_i|^2), the sum of
+  // squares by moves for all rows with random signs.
+  double rounding_length() {
+    std::uint32_t random = 1;
+    double squares = 0.0;
+    for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
+      for (std::size_t i = 0; i < g_.size(); ++i) {
+        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
+        const double rounding = 8.0 * kEpsilon * rows_.C().terms(static_cast<int>(i), y_.data());
+        kept_g_[i] = random >> 31 != 0 ? rounding : -rounding;
+      }
+      rows_.solve(kept_g_);
+      ++statistics_.iterations;
+      squares += square(length_of_solution());
+    }
+    rows_.solve(g_);
+    return std::sqrt(squares / kSignPatterns * count());
+  }
   static void take(double share, const double* __restrict dy, int n, double* __restrict ycor,
                    double* __restrict y) {
     for (int k = 0; k < n; ++k) {
@@ -159,344 +447,6 @@ class ContiguousRows final : public RowsAt {
   std::optional<std::vector<int>> levels_;  // of the rows as they are arranged
   N_Vector id_ = nullptr;                   // that they are arranged by
 };
-
-Status ContiguousRows::load(const Candidate& candidate, bool refills) {
-  place(candidate);
-  if (!refills) metric_.find(at_);
-  decided_ = moved_ = false;
-  return rows_.structured() ? Status::success : structure(candidate.t, nullptr);
-}
-
-Status ContiguousRows::value(double t, bool with_rows) {
-  const bool both = with_rows && evaluator_.gives_both();
-  const Status status =
-      both ? rows(t, g_.data()) : evaluator_.value(t, y_.data(), unknowns(), g_.data());
-  rows_known_ = both && status == Status::success;
-  drift = 0.0;
-  for (std::size_t i = 0; i < reported_; ++i) drift = std::max(drift, std::abs(g_[i]));
-  return status;
-}
-
-Status ContiguousRows::structure(double t, N_Vector id) {
-  factors = Factors::none;
-  levels_.reset();
-  const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
-  return rows_.structure(t, y_, WT(), options_.hold, mask);
-}
-
-// Level of each unknown in the rows that are measured in tolerances; empty if there is one level.
-// Structural entries count, also those that are zero now: at rest the entries of positions in rows
-// of velocities are.
-const std::vector<int>& ContiguousRows::levels() {
-  if (levels_) return *levels_;
-  levels_ = levels_of_columns(rows_.C().pattern(rows_.d.rows));
-  if (*std::max_element(levels_->begin(), levels_->end()) < 1) levels_->clear();
-  return *levels_;
-}
-
-bool ContiguousRows::use_levels(bool on) {
-  if (on && levels().empty()) return false;
-  metric_.use_levels(on ? levels() : std::vector<int>());
-  factors = Factors::none;
-  return true;
-}
-
-void ContiguousRows::find_rates() {
-  if (!in_use(Mechanism::rate_limit) || at_.predicted_rate == nullptr || metric_.by_rates() ||
-      options_.advanced.metric != Metric::local_correction || ++decisions_ > kEarly)
-    return;
-  const std::vector<int>& found = levels();
-  if (found.empty() || !first_are_rates_of_zeroth(found)) return;
-  metric_.use_rates(found);
-  fill_metric();
-}
-
-// Whether levels 0 and 1 have equally many unknowns and rows, and unknowns and rates are of equal
-// size. An energy is one row more.
-bool ContiguousRows::first_are_rates_of_zeroth(const std::vector<int>& levels) {
-  double rates = 0.0, values = 0.0;
-  int more = 0, more_rows = 0;
-  for (std::size_t i = 0; i < levels.size(); ++i) {
-    if (levels[i] == 0) {
-      rates += square(at_.predicted_rate[i] + at_.cj * at_.correction_entries[i]);
-      ++more;
-    } else if (levels[i] == 1) {
-      values += square(y_[i]);
-      --more;
-    }
-  }
-  for (const int i : rows_.d.rows) {
-    int level = -1;
-    rows_.C().visit(i, [&](int j, double entry) {
-      if (entry != 0.0) level = std::max(level, levels[static_cast<std::size_t>(j)]);
-    });
-    more_rows += level == 0 ? 1 : level == 1 ? -1 : 0;
-  }
-  return more == 0 && more_rows == 0 && values > 0.0 && std::abs(rates - values) <= kAlike * values;
-}
-
-// C at the present y, and g if wanted. Only differences and mixed rows need the size of a
-// tolerance.
-Status ContiguousRows::rows(double t, double* g) {
-  return rows_.evaluate(t, y_.data(), rows_.needs_WT() ? WT().data() : nullptr, g, [this] {
-    factors = Factors::none;
-    levels_.reset();
-    fill_metric();
-  });
-}
-
-Status ContiguousRows::factor(double t, bool refill) {
-  if (refill) fill_metric();
-  if (!rows_known_) {
-    const Status status = rows(t, nullptr);
-    if (status != Status::success) return status;
-  }
-  rows_known_ = false;
-  t_ = t;
-  const bool known = in_use(Mechanism::kept_rank) && lasting_ && factors != Factors::none;
-  if (!known || !rows_.factor_kept()) return decide(t);
-  thin_ = false;
-  ++statistics_.refactorizations;
-  return Status::success;
-}
-
-// Factors that show which rows are independent.
-Status ContiguousRows::decide(double t) {
-  factors = Factors::none;
-  ++statistics_.factorizations;
-  find_rates();
-  if (!rows_.factor()) {
-    report.text = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t);
-    return Status::not_finite;
-  }
-  const bool drops = rows_.drops_rows();
-  if (drops) ++statistics_.rank_drops;
-  thin_ = in_use(Mechanism::row_trust) && !rows_.C().sparse() &&
-          RowTrust::has_thin_rows(rows_.counted().dense);
-  lasting_ = !thin_;
-  decided_ = true;
-  factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
-  return Status::success;
-}
-
-// Algebraic columns do not count: they follow the others, and are not in the error test.
-double ContiguousRows::length_of_solution() {
-  double sum = 0.0;
-  const Block& block = rows_.counted();
-  block.for_columns([&sum, dy = block.dy.data(), w = at_.weight_entries](int k, int i) {
-    const double move = dy[k] * w[i];
-    sum += move * move;
-  });
-  return wrms(sum);
-}
-
-Solution ContiguousRows::solve(Solve how) {
-  Solution found;
-  rows_.solve(g_);
-  if (how == Solve::point) {  // C of another point says nothing about its thin rows
-    thin_ = lasting_ = false;
-    double sum = 0.0;
-    rows_.for_moves([&](int j, double move) { sum += square(move * at_.weight_entries[j]); });
-    found.length = wrms(sum);
-    found.rank = rows_.rank();
-    return found;
-  }
-  if (how != Solve::test) ++statistics_.iterations;
-  found.length = length_of_solution();
-  if (how == Solve::first && thin_) {
-    found.length = judge_thin_rows(found.length);
-    if (!moved_ && rows_.trust.must_learn(found.length)) {
-      // The move of the firm rows shows how C turns. Then all rows are judged at the start of the
-      // move.
-      rows_.for_moves([this](int j, double move) { y_[static_cast<std::size_t>(j)] -= move; });
-      found.status = learn_trust(found.length);
-      place(at_);
-      if (found.status == Status::success) found.status = factor(t_, false);
-      if (found.status != Status::success) return found;
-      rows_.solve(g_);
-      found.length = judge_thin_rows(length_of_solution());
-    }
-  }
-  if (how != Solve::rest && !dropped_follow()) {
-    lasting_ = false;
-    if ((found.status = factor(t_, false)) != Status::success) return found;
-    rows_.solve(g_);
-    found.length = length_of_solution();
-    if (thin_) found.length = judge_thin_rows(found.length);
-    (void)dropped_follow();  // notes what they ask for now
-  }
-  length_ = found.length;
-  return found;
-}
-
-// After a solution: whether the dropped rows follow from the kept ones. They are satisfied only
-// while they depend on these. If they ask for a longer move than when they were dropped, one of
-// them may have become independent.
-bool ContiguousRows::dropped_follow() {
-  if (rows_.C().sparse() || !rows_.drops_rows()) return true;
-  const double left = rows_.left_of_dropped(WT());
-  if (decided_) usual_ = left;
-  return decided_ || left <= std::max(kFollows * options_.advanced.tolerance, 2.0 * usual_) ||
-         left <= 1e2 * kEpsilon * N_VWrmsNorm(at_.base, at_.weights);
-}
-
-double ContiguousRows::length_with(int rank) {
-  rows_.counted().dense.use_rank(rank);
-  rows_.solve(g_);
-  return length_of_solution();
-}
-
-// After a solution of this length with all rows: decides which thin rows take part until the next
-// factorisation. Returns the length of the solution with those. Firm rows do not magnify their
-// right-hand side.
-double ContiguousRows::judge_thin_rows(double length) {
-  linalg::MinimumNorm& solver = rows_.counted().dense;
-  const int all = solver.rank(), firm = RowTrust::firm_rows(solver);
-  if (rows_.trust.trusted_rows(solver, length) == all) return length;
-  const bool whole = !rows_.drops_rows();
-  const double firm_length = length_with(firm);
-  solver.use_rank(all);
-  const int trusted = rows_.trust.trusted_rows(solver, firm_length);
-  solver.use_rank(trusted);
-  lasting_ = RowTrust::lasting(solver, firm, trusted);
-  if (whole && trusted < all) ++statistics_.rank_drops;
-  return trusted > firm ? length_with(trusted) : firm_length;
-}
-
-Status ContiguousRows::apply(double share, const Candidate& candidate) {
-  double* const correction = candidate.correction_entries;
-  const bool learns = thin_ && !moved_ && share == 1.0;
-  moved_ = true;
-  rows_.for_blocks([&](const Block& block) {
-    if (block.first >= 0)
-      take(share, block.dy.data(), static_cast<int>(block.columns.size()), correction + block.first,
-           y_.data() + block.first);
-    else
-      block.for_columns([=, y = y_.data(), dy = block.dy.data()](int k, int i) {
-        correction[i] -= share * dy[k];
-        y[i] -= share * dy[k];
-      });
-  });
-  return learns ? learn_trust(length_) : Status::success;
-}
-
-double ContiguousRows::corrected() const {
-  double sum = 0.0;
-  rows_.d.for_columns(
-      [&](int, int j) { sum += square(at_.correction_entries[j] * at_.weight_entries[j]); });
-  return wrms(sum);
-}
-
-double ContiguousRows::follow(const Candidate& candidate, N_Vector change) {
-  if (change == nullptr) {
-    place(candidate);
-    return 0.0;
-  }
-  const double *e = N_VGetArrayPointer(change), *w = at_.weight_entries;
-  double* y = y_.data();
-  for (int i = 0, n = unknowns(); i < n; ++i) y[i] += e[i];
-  double sum = 0.0;
-  rows_.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
-  return wrms(sum);
-}
-
-bool ContiguousRows::is_rounding(double move) {
-  if (std::isfinite(move)) return move <= rounding_length();
-  for (std::size_t i = 0; i < g_.size(); ++i)
-    if (!(std::abs(g_[i]) <= kRoundingOfTerms * rows_.C().terms(static_cast<int>(i), y_.data())))
-      return false;
-  return true;
-}
-
-// Length of the move that the rounding of g asks for in the worst case, with the current factors:
-// at most sum_i |dy_i|, dy_i the move for row i alone, and so sqrt(m sum_i |dy_i|^2), the sum of
-// squares by moves for all rows with random signs.
-double ContiguousRows::rounding_length() {
-  std::uint32_t random = 1;
-  double squares = 0.0;
-  for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
-    for (std::size_t i = 0; i < g_.size(); ++i) {
-      random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
-      const double rounding = 8.0 * kEpsilon * rows_.C().terms(static_cast<int>(i), y_.data());
-      kept_g_[i] = random >> 31 != 0 ? rounding : -rounding;
-    }
-    rows_.solve(kept_g_);
-    ++statistics_.iterations;
-    squares += square(length_of_solution());
-  }
-  rows_.solve(g_);
-  return std::sqrt(squares / kSignPatterns * count());
-}
-
-bool ContiguousRows::tangency(const std::vector<double>& yp, const double* id, Tangency& out) {
-  if (!rows_.structured() || factors == Factors::none) return false;
-  for (std::vector<double>* each : {&out.rate, &out.terms, &out.tolerance, &out.size})
-    each->resize(reported_);
-  for (std::size_t i = 0; i < reported_; ++i) {
-    double rate = 0.0, terms = 0.0, sum = 0.0, size = 0.0;
-    bool algebraic = false;
-    rows_.C().visit(static_cast<int>(i), [&](int j, double c) {
-      const auto k = static_cast<std::size_t>(j);
-      const bool differential = id == nullptr || id[j] != 0.0;
-      algebraic = algebraic || (c != 0.0 && !differential);
-      rate += c * yp[k];
-      terms += std::abs(c * yp[k]);
-      if (differential) size += std::abs(c) * std::max(1.0, std::abs(y_[k]));
-      sum += at_.weight_entries[k] > 0.0 ? square(c / at_.weight_entries[k]) : 0.0;
-    });
-    out.rate[i] = rate;
-    out.size[i] = size;
-    out.terms[i] = algebraic ? -1.0 : terms;
-    out.tolerance[i] = std::sqrt(sum);
-  }
-  return true;
-}
-
-Status ContiguousRows::linearise(double t, N_Vector y, N_Vector weights, N_Vector id) {
-  t_ = t;
-  at_.weight_entries = N_VGetArrayPointer(weights);
-  std::copy_n(N_VGetArrayPointer(y), y_.size(), y_.begin());
-  const bool arranged = std::exchange(id_, id) == id && rows_.structured();
-  if (!arranged) {
-    const Status status = structure(t, id);
-    if (status != Status::success) return status;
-  }
-  return rows_.evaluate(t, y_.data(), WT().data(), nullptr, [this] { factors = Factors::none; });
-}
-
-Status ContiguousRows::factor_in(N_Vector D) {
-  rows_.set_metric(N_VGetArrayPointer(D));
-  if (factors == Factors::of_all_rows && rows_.factor_kept()) {
-    ++statistics_.refactorizations;
-    return Status::success;
-  }
-  const Status status = decide(t_);
-  if (status == Status::success && !rows_.C().sparse())
-    rows_.for_blocks([](Block& block) { block.dense.use_rank(RowTrust::firm_rows(block.dense)); });
-  return status;
-}
-
-// A C by differences is good for Newton's moves only: C s by those of g along s, of fourth order.
-Status ContiguousRows::product(N_Vector s, std::vector<double>& r) {
-  const double* along = N_VGetArrayPointer(s);
-  if (!evaluator_.uses_differences()) {
-    for (int i = 0; i < count(); ++i) r[static_cast<std::size_t>(i)] = rows_.C().times(i, along);
-    return Status::success;
-  }
-  double largest_s = 0.0, largest_y = 0.0;
-  for (std::size_t j = 0; j < y_.size(); ++j) {
-    largest_s = std::max(largest_s, std::abs(along[j]));
-    largest_y = std::max({largest_y, std::abs(y_[j]), WT_[j]});
-  }
-  std::fill(r.begin(), r.end(), 0.0);
-  if (largest_s == 0.0) return Status::success;
-  std::vector<double> at(y_);
-  const double d = kAlong * (largest_y > 0.0 ? largest_y : 1.0) / largest_s;
-  return central_differences(d, r, g_, [&](double e, std::vector<double>& g) {
-    for (std::size_t j = 0; j < y_.size(); ++j) at[j] = y_[j] + e * along[j];
-    return evaluator_.value(t_, at.data(), unknowns(), g.data());
-  });
-}
 
 }  // namespace
 

@@ -48,8 +48,6 @@ class LocalMetric {
       limit(at.h);
     return D_;
   }
-  /// D as find() left it.
-  const std::vector<double>& D() const { return D_; }
   /// One scale for each of these groups, in place of Options::group; empty: no longer.
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
   /// Unknowns of level 1 are the rates of those of level 0: scales obey that from now on, see

@@ -11,11 +11,10 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kLargestFloor = 0.1;     // tolerances
-constexpr double kStaleRowsSafety = 4.0;  // factor for C of an earlier step
-constexpr int kMostTests = 16;            // candidates tested with the factors of an earlier one
-constexpr int kUnneededMoves = 8;         // moves below kNothing in a row, then tests begin again
-constexpr int kUsualMoves = 3;            // moves with a C that is renewed in each
+constexpr double kLargestFloor = 0.1;  // tolerances
+constexpr int kMostTests = 16;         // candidates tested with the factors of an earlier one
+constexpr int kUnneededMoves = 8;      // moves below kNothing in a row, then tests begin again
+constexpr int kUsualMoves = 3;         // moves with a C that is renewed in each
 
 // Length of the moves that rounding of y explains: WRMS of y in units of rounding.
 double rounding_of(const Candidate& candidate) {
@@ -46,7 +45,7 @@ bool Mover::may_test() const {
 bool Mover::clearly_needs_no_move() {
   if (!may_test()) return false;
   ++age_;
-  return rows_->is_rounding() || kStaleRowsSafety * rows_->solve(Solve::test).length <= kNothing;
+  return rows_->is_rounding() || kStaleSafety * rows_->solve(Solve::test).length <= kNothing;
 }
 
 Move Mover::measure(const Candidate& candidate) {
@@ -68,7 +67,7 @@ Move Mover::measure(const Candidate& candidate) {
   return result;
 }
 
-// After several moves that were not needed g alone is looked at first: rows may be contained in F,
+// After several moves that were not needed g alone is evaluated first: rows may be contained in F,
 // or kept by IDA itself in most steps.
 Move Mover::move(const Candidate& candidate) {
   Move result;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "movers/rows_at.hpp"
+#include "rows/row_trust.hpp"
 
 namespace tether::ida_projection {
 
@@ -23,6 +24,8 @@ struct Move {
   double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
 };
 
+constexpr double kStaleSafety = 4.0;  ///< for moves by C of another point
+
 /// Factors of a point `reach` tolerances away leave the part kappa reach of a move. Second moves
 /// measure kappa, and are made only where it could matter. Measurements only increase kappa; a
 /// safety factor of 4 covers that it is measured rarely (method, eq. 8).
@@ -30,7 +33,7 @@ class Curvature {
  public:
   /// Whether kappa is to be measured by a second move.
   bool due(double reach, long candidate) const {
-    return kappa_ < 0.0 || !(reach <= kSafety * measured_) || candidate % kMeasureEvery == 0;
+    return kappa_ < 0.0 || !(reach <= kStaleSafety * measured_) || candidate % kMeasureEvery == 0;
   }
   /// A second move, after a first one of length `move`, was `left` long.
   void measured(double reach, double move, double left) {
@@ -38,12 +41,9 @@ class Curvature {
     kappa_ = std::max({kappa_, 0.0, left / (reach * move)});
   }
   /// Length that a move of this length leaves, in tolerances.
-  double left(double reach, double length) const { return kSafety * kappa_ * reach * length; }
+  double left(double reach, double length) const { return kStaleSafety * kappa_ * reach * length; }
 
  private:
-  static constexpr double kSafety = 4.0;
-  static constexpr long kMeasureEvery = 64;
-
   double kappa_ = -1.0;    // for each tolerance of distance; < 0: not measured
   double measured_ = 0.0;  // longest distance at which it was measured
 };

@@ -86,8 +86,6 @@ class RowsAt {
   virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
     return Status::success;
   }
-  /// D as the last candidate had it, of every component; false: there is none.
-  virtual bool metric(N_Vector /*D*/) const { return false; }
   /// The attempt that used the last candidate was accepted: its scale is kept.
   virtual void accept() {}
   virtual void reset() {}

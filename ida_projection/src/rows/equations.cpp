@@ -119,24 +119,6 @@ std::vector<double> further_away(const std::vector<double>& y, const std::vector
   return some_tolerances_away(y, reach);
 }
 
-// Columns in tolerances, rows to length 1, entries of rounding size to zero.
-void scale(const std::vector<double>& WT, Dense* a) {
-  for (Eigen::Index j = 0; j < a->cols(); ++j) a->col(j) *= WT[at(j)] > 0.0 ? WT[at(j)] : 1.0;
-  for (Eigen::Index i = 0; i < a->rows(); ++i) {
-    const double length = a->row(i).norm();
-    if (length > 0.0) a->row(i) /= length;
-    for (Eigen::Index j = 0; j < a->cols(); ++j)
-      if (std::abs((*a)(i, j)) < kPresent) (*a)(i, j) = 0.0;
-  }
-}
-
-Dense select(const Dense& from, const std::vector<int>& rows, const std::vector<int>& columns) {
-  Dense out(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size()));
-  for (Eigen::Index i = 0; i < out.rows(); ++i)
-    for (Eigen::Index j = 0; j < out.cols(); ++j) out(i, j) = from(rows[at(i)], columns[at(j)]);
-  return out;
-}
-
 // Orthonormal rows, by Gram-Schmidt applied twice.
 class Span {
  public:
@@ -158,41 +140,37 @@ class Span {
   std::vector<Eigen::VectorXd> units_;
 };
 
-// C and h at one point, scaled, and the multiples x of h that cancel the algebraic part of rows of
-// C.
+// C at one point, then h, scaled, with the multiples x of h that cancel the algebraic part of rows
+// of C. Columns that are not free are zero.
 struct Point {
+  std::vector<double> y;
   Dense C, h;
   linalg::LeastSquares factors{kPresent};  // of h_a^T
 
-  bool evaluate(Evaluator& rows, const Residual& residual, const std::vector<int>& equations,
-                double t, const std::vector<double>& y, const std::vector<double>& WT,
-                const std::vector<int>& free, const std::vector<int>& algebraic) {
+  bool evaluate_rows(Evaluator& rows, double t, const std::vector<double>& WT,
+                     const std::vector<int>& free) {
+    C = Dense::Zero(rows.rows(), static_cast<Eigen::Index>(y.size()));
     const auto n = static_cast<int>(y.size());
-    C = Dense::Zero(rows.rows(), n);
-    h = Dense::Zero(static_cast<Eigen::Index>(equations.size()), n);
-    std::vector<int> held(y.size());
-    std::iota(held.begin(), held.end(), 0);
+    return rows.jacobian(t, y.data(), n, WT.data(), free, C.data()) == Status::success &&
+           finish(&C, WT, free);
+  }
+  bool evaluate_equations(const Residual& residual, const std::vector<int>& equations,
+                          const std::vector<double>& WT, const std::vector<int>& free,
+                          const std::vector<int>& algebraic) {
+    h = Dense::Zero(static_cast<Eigen::Index>(equations.size()), C.cols());
+    std::vector<int> all(y.size());
+    std::iota(all.begin(), all.end(), 0);
     std::vector<double> weights(WT);
     for (double& w : weights) w = w > 0.0 ? 1.0 / w : 0.0;
     Differences of_F(
-        {equations, {equations.size(), held}, {}}, residual, [&] { return weights.data(); }, n);
-    if (rows.jacobian(t, y.data(), n, WT.data(), free, C.data()) != Status::success ||
-        of_F.entries(y.data(), h.data()) != 0 || !C.allFinite() || !h.allFinite())
-      return false;
-    for (int j : free) held[at(j)] = -1;
-    for (int j : held) {
-      if (j < 0) continue;
-      C.col(j).setZero();
-      h.col(j).setZero();
-    }
-    scale(WT, &C);
-    scale(WT, &h);
-    std::vector<int> every(at(h.rows()));
-    for (std::size_t i = 0; i < every.size(); ++i) every[i] = static_cast<int>(i);
-    factors.factor(select(h, every, algebraic).transpose());
+        {equations, {equations.size(), all}, {}}, residual, [&] { return weights.data(); },
+        static_cast<int>(y.size()));
+    if (of_F.entries(y.data(), h.data()) != 0 || !finish(&h, WT, free)) return false;
+    Dense part(h.rows(), static_cast<Eigen::Index>(algebraic.size()));
+    for (Eigen::Index k = 0; k < part.cols(); ++k) part.col(k) = h.col(algebraic[at(k)]);
+    factors.factor(part.transpose());
     return true;
   }
-
   // False: h leaves something of the row's algebraic part.
   bool explain(int row, const std::vector<int>& algebraic, Eigen::VectorXd* x) const {
     Eigen::VectorXd part(static_cast<Eigen::Index>(algebraic.size()));
@@ -206,52 +184,33 @@ struct Point {
       for (Eigen::Index k = 0; k < part.size(); ++k) made[k] += (*x)[i] * h(i, algebraic[at(k)]);
     return (made - part).norm() <= kExplained * part.norm();
   }
+
+ private:
+  // Columns in tolerances, rows to length 1, entries of rounding size to zero.
+  static bool finish(Dense* a, const std::vector<double>& WT, const std::vector<int>& free) {
+    if (!a->allFinite()) return false;
+    Eigen::RowVectorXd size = Eigen::RowVectorXd::Zero(a->cols());
+    for (int j : free) size[j] = WT[at(j)] > 0.0 ? WT[at(j)] : 1.0;
+    a->array().rowwise() *= size.array();
+    for (Eigen::Index i = 0; i < a->rows(); ++i) {
+      const double length = a->row(i).norm();
+      if (length > 0.0) a->row(i) /= length;
+      for (Eigen::Index j = 0; j < a->cols(); ++j)
+        if (std::abs((*a)(i, j)) < kPresent) (*a)(i, j) = 0.0;
+    }
+    return true;
+  }
 };
 
 }  // namespace
 
-// Rows given by their entries have no others.
-static bool patterns_leave_out(const Evaluator& rows, const std::vector<char>& algebraic) {
-  for (const Evaluator::Part& part : rows.parts()) {
-    const auto* sparse = std::get_if<SparseJacobian>(&part.set->jacobian);
-    if (sparse == nullptr) return false;
-    for (const int j : sparse->columns)
-      if (algebraic[at(j)]) return false;
-  }
-  return true;
-}
-
-std::vector<int> rows_with_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
-                                     const std::vector<double>& WT, const std::vector<bool>& hold,
-                                     const double* id) {
-  const auto n = static_cast<int>(y.size());
-  std::vector<int> algebraic;
-  std::vector<char> is_algebraic(at(n), 0);
-  for (int j = 0; j < n; ++j)
-    if (id[j] == 0.0 && (hold.empty() || !hold[at(j)])) {
-      algebraic.push_back(j);
-      is_algebraic[at(j)] = 1;
-    }
-  if (algebraic.empty() || patterns_leave_out(rows, is_algebraic)) return {};
-  Dense C = Dense::Zero(rows.rows(), n);
-  std::vector<char> contains(at(rows.rows()), 0);
-  for (const std::vector<double>& point : {y, further_away(y, WT)}) {
-    if (rows.jacobian(t, point.data(), n, WT.data(), algebraic, C.data()) != Status::success)
-      continue;
-    for (Eigen::Index i = 0; i < C.rows(); ++i)
-      for (int j : algebraic) contains[at(i)] |= C(i, j) != 0.0 ? 1 : 0;
-  }
-  std::vector<int> found;
-  for (int i = 0; i < rows.rows(); ++i)
-    if (contains[at(i)]) found.push_back(i);
-  return found;
-}
-
-// Compares values at points in three directions, far enough away that rounding stays below the
-// tenth digit. Rows that only touch an equation differ in the fifth.
-bool are_the_equations(Evaluator& rows, const Residual& residual, const std::vector<int>& which,
-                       const std::vector<char>& derivative_free, double t,
-                       const std::vector<double>& y, const std::vector<double>& WT) {
+// Whether these rows are, up to factors, all equations of F without y': compares values at points
+// in three directions, far enough away that rounding stays below the tenth digit. Rows that only
+// touch an equation differ in the fifth. Costs three evaluations of F.
+static bool are_the_equations(Evaluator& rows, const Residual& residual,
+                              const std::vector<int>& which,
+                              const std::vector<char>& derivative_free, double t,
+                              const std::vector<double>& y, const std::vector<double>& WT) {
   const auto equations = std::count(derivative_free.begin(), derivative_free.end(), 1);
   if (equations != static_cast<std::ptrdiff_t>(which.size())) return false;
   constexpr int kPoints = 3;
@@ -300,42 +259,45 @@ static void find_columns(const Residual& residual, double t, const std::vector<d
 }
 
 JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
-                                      const std::vector<char>& derivative_free, double t,
-                                      const std::vector<double>& y, const std::vector<double>& WT,
-                                      const std::vector<bool>& hold, const double* id) {
+                                      const std::function<std::vector<char>()>& derivative_free,
+                                      double t, const std::vector<double>& y,
+                                      const std::vector<double>& WT, const std::vector<bool>& hold,
+                                      const double* id, bool index_is_low) {
   JoinedEquations found;
   const auto n = static_cast<int>(y.size());
-  std::vector<int> equations, free, algebraic, differential;
+  std::vector<int> free, algebraic;
   for (int j = 0; j < n; ++j) {
-    if (derivative_free[at(j)]) equations.push_back(j);
     if (!hold.empty() && hold[at(j)]) continue;
     free.push_back(j);
-    (id[j] == 0.0 ? algebraic : differential).push_back(j);
+    if (id[j] == 0.0) algebraic.push_back(j);
   }
-  if (equations.empty() || algebraic.empty()) return found;
-
   // Away from the candidate structural entries are not zero; at the candidate they have their size.
-  Point away, here;
-  const bool far =
-      away.evaluate(rows, residual, equations, t, further_away(y, WT), WT, free, algebraic);
-  if ((!far && !away.evaluate(rows, residual, equations, t, some_tolerances_away(y, WT), WT, free,
-                              algebraic)) ||
-      !here.evaluate(rows, residual, equations, t, y, WT, free, algebraic))
-    return found;
+  Point away{further_away(y, WT), {}, {}}, here{y, {}, {}};
+  if (algebraic.empty() || !here.evaluate_rows(rows, t, WT, free)) return found;
+  if (!away.evaluate_rows(rows, t, WT, free)) {
+    away.y = some_tolerances_away(y, WT);
+    if (!away.evaluate_rows(rows, t, WT, free)) return found;
+  }
 
   const int m = rows.rows();
   const auto contains = [&](int i, int j) { return away.C(i, j) != 0.0 || here.C(i, j) != 0.0; };
-  const auto hangs_on = [&](int i) {
-    return std::any_of(algebraic.begin(), algebraic.end(), [&](int j) { return contains(i, j); });
-  };
   Span plain;  // rows of differential variables alone
-  std::vector<int> hanging;
+  std::vector<int> hanging, equations;
   for (int i = 0; i < m; ++i) {
-    if (hangs_on(i))
+    if (std::any_of(algebraic.begin(), algebraic.end(), [&](int j) { return contains(i, j); }))
       hanging.push_back(i);
     else
       plain.add(here.C.row(i).transpose(), kPresent);
   }
+  if (hanging.empty()) return found;
+  const std::vector<char> is_equation = derivative_free();
+  for (int i = 0; i < n; ++i)
+    if (is_equation[at(i)]) equations.push_back(i);
+  if (index_is_low && are_the_equations(rows, residual, hanging, is_equation, t, y, WT))
+    return found;
+  if (equations.empty() || !away.evaluate_equations(residual, equations, WT, free, algebraic) ||
+      !here.evaluate_equations(residual, equations, WT, free, algebraic))
+    return found;
 
   // Finds the rows that constrain y_d in a new direction, and the equations that they need.
   std::vector<char> used(equations.size(), 0);

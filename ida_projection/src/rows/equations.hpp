@@ -27,25 +27,17 @@ struct JoinedEquations {
   std::vector<char> moves;                ///< N: algebraic variables that move with the rest
 };
 
-/// The rows that contain free algebraic variables, at y or away from it. F is not evaluated.
-std::vector<int> rows_with_algebraic(Evaluator& rows, double t, const std::vector<double>& y,
-                                     const std::vector<double>& WT, const std::vector<bool>& hold,
-                                     const double* id);
-
-/// Whether these rows are, up to factors, all equations of F without y'. If F is of index 1 nothing
-/// has to be joined then. Costs three evaluations of F.
-bool are_the_equations(Evaluator& rows, const Residual& residual, const std::vector<int>& which,
-                       const std::vector<char>& derivative_free, double t,
-                       const std::vector<double>& y, const std::vector<double>& WT);
-
-/// Finds the equations to join at the point y. `derivative_free`: the equations of F without y'.
+/// Finds the equations to join at the point y. `derivative_free()`: the equations of F without y'.
 /// id: 1 differential, 0 algebraic. WT: error weights. Nothing is joined for rows that repeat
 /// equations of F (a tension row), nor for rows whose algebraic variables F does not determine in
 /// this way (multipliers of velocity rows): these are solved for their algebraic variables.
+/// Without rows that contain free algebraic variables F is not evaluated; if F is of index 1 and
+/// the rows are its equations, it is hardly.
 JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
-                                      const std::vector<char>& derivative_free, double t,
-                                      const std::vector<double>& y, const std::vector<double>& WT,
-                                      const std::vector<bool>& hold, const double* id);
+                                      const std::function<std::vector<char>()>& derivative_free,
+                                      double t, const std::vector<double>& y,
+                                      const std::vector<double>& WT, const std::vector<bool>& hold,
+                                      const double* id, bool index_is_low);
 
 /// The equations as a set, their Jacobian by differences, one evaluation of F for all columns that
 /// no equation shares. weights: 1/WT at the present candidate.

@@ -2,10 +2,15 @@
 // BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
 
 namespace tether::ida_projection {
+
+constexpr long kMeasureEvery = 64;  ///< candidates: how often curvatures are measured anew
 
 /// Rows that are dependent on the set { g = 0 } are independent at a distance d from it, by an
 /// angle kappa d; kappa is the rate at which the unit rows of C D turn with y (method, section 9).
@@ -32,18 +37,43 @@ class RowTrust {
     return trusted == firm && solver.independent_part(firm) <= kDependent;
   }
   /// Number of rows that take part for a move of this length (tolerances) of the firm rows.
-  int trusted_rows(const Solver& solver, double length) const;
+  int trusted_rows(const Solver& solver, double length) const {
+    if (kappa_ < 0.0) return rows_from(solver, length > kShort ? kThin : 0.0);
+    return rows_from(solver, std::min(kThin, kSafety * kappa_ * length));
+  }
 
   /// Whether C must be evaluated after a move of this length before thin rows can be judged.
   bool must_learn(double length) const { return kappa_ < 0.0 && length > kShort; }
   /// Whether the turn of C over a move of this length is to be measured.
-  bool wants_to_learn(double length);
+  bool wants_to_learn(double length) {
+    if (!(length > kShort)) return false;
+    return kappa_ < 0.0 || length > 4.0 * measured_ || ++candidates_ % kMeasureEvery == 0;
+  }
   /// From C (row-major, n columns) before and after the move; rows, columns: those in the solver.
   void learn(Solver& solver, const std::vector<int>& rows, const std::vector<int>& columns, int n,
-             const std::vector<double>& before, const std::vector<double>& after, double length);
+             const std::vector<double>& before, const std::vector<double>& after, double length) {
+    const double* D = solver.metric();
+    double largest = 0.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double norm = solver.row_norm(static_cast<int>(i));
+      if (!(norm > std::numeric_limits<double>::min())) continue;
+      const auto first = static_cast<std::size_t>(rows[i]) * static_cast<std::size_t>(n);
+      double sum = 0.0;
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        const std::size_t entry = first + static_cast<std::size_t>(columns[k]);
+        const double change = (after[entry] - before[entry]) * D[k];
+        sum += change * change;
+      }
+      largest = std::max(largest, std::sqrt(sum) / norm);
+    }
+    if (!std::isfinite(largest)) return;
+    kappa_ = std::max(kappa_, largest / length);
+    measured_ = std::max(measured_, length);
+  }
   void reset() { *this = RowTrust(); }
 
  private:
+  static constexpr double kSafety = 2.0;
   static constexpr double kDependent = 1e-5;
   static constexpr double kShort = 1e-3;  // tolerances: over less than that C does not turn visibly
 

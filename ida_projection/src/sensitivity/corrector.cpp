@@ -15,8 +15,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kFewRows = 64;  // factors for each sensitivity
-
 /// The content of an N_VectorSensWrapper, the Ns vectors that IDAS corrects together. SUNDIALS
 /// declares it in sundials_nvector_senswrapper.h, which Debian does not ship; it is the same from
 /// 5.8 to 7.5. See why_not_wrapped().
@@ -105,10 +103,9 @@ SensitivityCorrector::SensitivityCorrector(Projection::Impl& state, Sensitivitie
     if (inner == nullptr) throw std::bad_alloc();
   }
   corrector_ = std::make_unique<Corrector>(inner, like);
-  for (OwnedVector* each : {&D_, &weights_, &s_, &work_, &spare_}) *each = OwnedVector(like);
+  for (OwnedVector* each : {&weights_, &s_, &work_, &spare_}) *each = OwnedVector(like);
   for (int k = 0; k < count(); ++k) ds_.emplace_back(like);
-  if (state_.constraints_.total_count() <= kFewRows)
-    for (int k = 0; k < count(); ++k) metrics_.emplace_back(state_.options_, like);
+  for (int k = 0; k < count(); ++k) metrics_.emplace_back(state_.options_, like);
   solver_.reset(Operations<SensitivityCorrector>::make(*this, inner, like->sunctx));
   if (!solver_) throw std::bad_alloc();
   const int flag = idas_.set_solver(state_.ida_.mem(), solver_.get());
@@ -246,24 +243,16 @@ void SensitivityCorrector::note_setups(double cj) {
   polish_->follow(state_.polish_);
 }
 
-// C at the accepted candidate, and its factors where one metric serves all.
+// C at the accepted candidate.
 Status SensitivityCorrector::evaluate(const StepData& step) {
   y_ = step.y;
   IDAGetErrWeights(state_.ida_.mem(), weights_);
   N_Vector id = state_.run_.engaged ? state_.movers_.joined.moved_id() : nullptr;
-  Status status = rows_->linearise(step.t, y_, weights_, id);
-  if (status == Status::success && metrics_.empty()) {
-    Mover* mover = state_.movers_.joined.mover() != nullptr ? state_.movers_.joined.mover()
-                                                            : state_.movers_.own.get();
-    if (!mover->rows().metric(D_)) N_VInv(weights_, D_);
-    status = rows_->factor_in(D_);
-  }
-  return status;
+  return rows_->linearise(step.t, y_, weights_, id);
 }
 
 // In the metric of sensitivity k; `first`: its correction is that of IDAS.
 Status SensitivityCorrector::factor(const Candidate& candidate, int k, bool first) {
-  if (metrics_.empty()) return Status::success;
   VectorMetric& metric = metrics_[static_cast<std::size_t>(k)];
   if (first) {
     const Candidate own{candidate.t, vectors_of(candidate.base)[k],

@@ -14,12 +14,11 @@
 namespace tether::ida_projection {
 
 /// After IDAS has corrected the sensitivities s_k = spred_k + e_k of a step whose state is
-/// projected already: e_k <- e_k - ds_k with C (s_k - ds_k) + dg/dp_k = 0, C at that state and in
-/// a metric D as for its move. As for the state, a polish follows, and is moved back onto the rows:
-/// it removes the noise that IDAS' convergence test leaves and lets algebraic variables respond.
-///
-/// If rows are few, factors are cheap. Each sensitivity then has a metric of its own, from the size
-/// of its corrections, which makes its errors smaller than the metric of the state does.
+/// projected already: e_k <- e_k - ds_k with C (s_k - ds_k) + dg/dp_k = 0, C at that state. As for
+/// the state, a polish follows, and is moved back onto the rows: it removes the noise that IDAS'
+/// convergence test leaves and lets algebraic variables respond. Each sensitivity has a metric of
+/// its own, from the size of its corrections, which makes its errors smaller than the metric of the
+/// state does.
 class SensitivityCorrector final : public Companion {
  public:
   /// `state`: the half of the plugin that moves the state. Throws std::invalid_argument.
@@ -75,9 +74,9 @@ class SensitivityCorrector final : public Companion {
 
   const Constraints* moved_ = nullptr;  // the caller's rows, or joined with equations of F
   std::unique_ptr<RowsAt> rows_;
-  OwnedVector D_, weights_, s_, work_, spare_;
+  OwnedVector weights_, s_, work_, spare_;
   N_Vector y_ = nullptr;                        // the accepted candidate
-  std::vector<VectorMetric> metrics_;           // of each parameter; empty: the state's for all
+  std::vector<VectorMetric> metrics_;           // of each parameter
   std::vector<OwnedVector> ds_;                 // of each parameter
   std::vector<std::vector<double>> row_terms_;  // dg/dp_k
   std::vector<double> r_, shifted_;

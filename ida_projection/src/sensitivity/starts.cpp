@@ -111,13 +111,13 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
   row_terms_.assign(static_cast<std::size_t>(count()),
                     std::vector<double>(static_cast<std::size_t>(rows_->count()), 0.0));
   r_ = row_terms_.front();
-  N_VInv(weights, D_);
-  OwnedVector at(y);
+  OwnedVector at(y), D(y);
+  N_VInv(weights, D);
   // r_ and the factors of C at (t + e, y + e y').
   const auto residual = [&](int k, double e, N_Vector of) {
     N_VLinearSum(1.0, y, e, yp, at);
     Status status = rows_->linearise(t + e, at, weights, state_.variables_.id());
-    if (status == Status::success) status = rows_->factor_in(D_);
+    if (status == Status::success) status = rows_->factor_in(D);
     if (status == Status::success) status = derivative(k, t + e, at);
     if (status == Status::success) status = rows_->product(of, r_);
     for (std::size_t i = 0; i < r_.size(); ++i) r_[i] += row_terms_[static_cast<std::size_t>(k)][i];

@@ -46,15 +46,10 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
   Evaluator rows(constraints_, statistics_);
   const Residual residual = [this](const double* at, double* f) { return residual_at(at, f); };
   const double* id = variables_.mask();
-  JoinedEquations found;
-  const std::vector<int> with = rows_with_algebraic(rows, candidate.t, y, WT, options_.hold, id);
-  if (!with.empty()) {
-    const std::vector<char> free = variables_.derivative_free_equations(candidate, corrector_, cj);
-    const bool plain = variables_.index_known() && !variables_.high_index() &&
-                       are_the_equations(rows, residual, with, free, candidate.t, y, WT);
-    if (!plain)
-      found = find_joined_equations(rows, residual, free, candidate.t, y, WT, options_.hold, id);
-  }
+  const JoinedEquations found = find_joined_equations(
+      rows, residual,
+      [&] { return variables_.derivative_free_equations(candidate, corrector_, cj); }, candidate.t,
+      y, WT, options_.hold, id, variables_.index_known() && !variables_.high_index());
   if (rows.report.fatal) corrector_.stop(-1, rows.report.text);
   if (found.moves.empty()) return;
   moved_id_ = OwnedVector(candidate.base);

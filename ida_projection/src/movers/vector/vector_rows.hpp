@@ -102,10 +102,6 @@ class VectorRows : public RowsAt {
     if (holds_algebraic_) metric_.hold_all_but(id);
     return Status::success;
   }
-  bool metric(N_Vector D) const override {
-    N_VScale(1.0, metric_.D(), D);
-    return factors != Factors::none;
-  }
   void accept() override { metric_.accept(); }
   void reset() override {
     metric_.reset();
