@@ -30,15 +30,7 @@ N_VectorContent_Serial content(N_Vector v) {
 double* data(N_Vector v) { return content(v)->data; }
 double* array_pointer(N_Vector v) { return data(v); }
 
-#if defined(__GNUC__)
 using Pair = double __attribute__((vector_size(16)));
-#else
-struct Pair {
-  double a, b;
-  friend Pair operator*(Pair x, Pair y) { return {x.a * y.a, x.b * y.b}; }
-  Pair& operator+=(Pair x) { return *this = {a + x.a, b + x.b}; }
-};
-#endif
 Pair pair_at(const double* x) {
   Pair pair;
   std::memcpy(&pair, x, sizeof pair);

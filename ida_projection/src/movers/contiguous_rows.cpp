@@ -245,11 +245,11 @@ class ContiguousRows final : public RowsAt {
     }
     std::fill(r.begin(), r.end(), 0.0);
     if (largest_s == 0.0) return Status::success;
-    std::vector<double> at(y_);
+    shifted_.resize(y_.size());
     const double d = kAlong * (largest_y > 0.0 ? largest_y : 1.0) / largest_s;
     return central_differences(d, r, g_, [&](double e, std::vector<double>& g) {
-      for (std::size_t j = 0; j < y_.size(); ++j) at[j] = y_[j] + e * along[j];
-      return evaluator_.value(t_, at.data(), unknowns(), g.data());
+      for (std::size_t j = 0; j < y_.size(); ++j) shifted_[j] = y_[j] + e * along[j];
+      return evaluator_.value(t_, shifted_.data(), unknowns(), g.data());
     });
   }
   void solve_for(const std::vector<double>& r, N_Vector ds) override {
@@ -435,13 +435,13 @@ class ContiguousRows final : public RowsAt {
   double inverse_n_;
   Candidate at_{};
   std::vector<double> y_, WT_, g_;
-  std::vector<double> kept_g_;     // work space
-  double t_ = 0.0, length_ = 0.0;  // of the last evaluation and solution
-  bool rows_known_ = false;        // C belongs to the present y
-  bool thin_ = false;              // some of the factored rows need RowTrust
-  bool lasting_ = false;           // the choice of rows is right for the next steps, too
-  bool decided_ = false;           // it was made for this candidate
-  bool moved_ = false;             // this candidate
+  std::vector<double> kept_g_, shifted_;  // work space
+  double t_ = 0.0, length_ = 0.0;         // of the last evaluation and solution
+  bool rows_known_ = false;               // C belongs to the present y
+  bool thin_ = false;                     // some of the factored rows need RowTrust
+  bool lasting_ = false;                  // the choice of rows is right for the next steps, too
+  bool decided_ = false;                  // it was made for this candidate
+  bool moved_ = false;                    // this candidate
   int decisions_ = 0;
   double usual_ = 0.0;  // asked for by dropped rows after the moves, when that was decided
   std::optional<std::vector<int>> levels_;  // of the rows as they are arranged

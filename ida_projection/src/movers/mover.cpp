@@ -88,7 +88,7 @@ Move Mover::move(const Candidate& candidate) {
   run_.nothing_in_row = nothing ? run_.nothing_in_row + 1 : 0;
   const bool broken =
       result.status == Status::not_converged || result.status == Status::move_too_long;
-  if (broken || result.moves > kUsualMoves) rows_->refresh_pattern_soon();
+  if (broken) rows_->refresh_pattern_soon();
   if (result.status == Status::success && !result.capped && rows_->contradicts())
     result.status = Status::inconsistent;
   return result;

@@ -79,7 +79,7 @@ class RowsAt {
   virtual double corrected() const = 0;
   /// Whether dropped rows contradict the kept ones; reported then.
   virtual bool contradicts() { return false; }
-  /// Moves failed or were many: perhaps entries of C are missing that g could not fill before.
+  /// Moves failed: perhaps entries of C are missing that g could not fill before.
   virtual void refresh_pattern_soon() {}
 
   /// Which components are algebraic (1 differential, 0 algebraic; null: none), at a candidate.
