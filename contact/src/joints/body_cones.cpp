@@ -24,21 +24,22 @@ constexpr double kSoft = 1e-5;    // compliance of a support over what moves the
 
 using linalg::at;
 
-BodyCone::Column speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
-  BodyCone::Column w = c.bias;
-  if (c.first >= 0) w += c.J1 * v[at(c.first)];
-  if (c.second >= 0) w += c.J2 * v[at(c.second)];
-  for (const auto& [body, J] : c.others) w += J * v[at(body)];
+// Sum of its terms, row by row, each as `part` has it.
+template <class Part>
+BodyCone::Column sum(const BodyCone& c, const std::vector<Vector6d>& v, const Part& part) {
+  BodyCone::Column w = part(c.bias);
+  if (c.first >= 0) w += part(c.J1) * part(v[at(c.first)]);
+  if (c.second >= 0) w += part(c.J2) * part(v[at(c.second)]);
+  for (const auto& [body, J] : c.others) w += part(J) * part(v[at(body)]);
   return w;
 }
-
-// Upper bound of the sum of its terms, row by row.
+BodyCone::Column speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
+  return sum(
+      c, v, [](const auto& x) -> const auto& { return x; });
+}
+// Upper bound of that.
 BodyCone::Column largest_speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
-  BodyCone::Column w = c.bias.cwiseAbs();
-  if (c.first >= 0) w += c.J1.cwiseAbs() * v[at(c.first)].cwiseAbs();
-  if (c.second >= 0) w += c.J2.cwiseAbs() * v[at(c.second)].cwiseAbs();
-  for (const auto& [body, J] : c.others) w += J.cwiseAbs() * v[at(body)].cwiseAbs();
-  return w;
+  return sum(c, v, [](const auto& x) { return x.cwiseAbs(); });
 }
 
 constexpr double kRank = 1e-6;  // of rows in their own scale

@@ -44,19 +44,18 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
   strikes.clear();
   impulses.assign(at(laws.count()), 0);
   plastic.assign(at(laws.count()), 0);
-  bias_.assign(at(laws.count()), 0);
-  plastic_bias_.assign(at(laws.count()), 0);
-  compliance_.assign(at(laws.count()), 0);
+  rows_.assign(at(laws.count()), {});
   for (int k = 0; k < laws.count(); ++k) {
     const JointLaws::Law& law = laws[k];
+    Row& row = rows_[at(k)];
     if (!law.limit) {
       // s' - rate + compliance x + stretch stiffness / (stiffness dt + damping)
-      bias_[at(k)] = plastic_bias_[at(k)] = -law.rate;
+      row.bias = -law.rate;
       if (law.is_sprung()) {
-        compliance_[at(k)] = 1 / (dt * (law.stiffness * dt + law.damping));
-        bias_[at(k)] += law.stretch * law.stiffness / (law.stiffness * dt + law.damping);
-        plastic_bias_[at(k)] = bias_[at(k)];
+        row.compliance = 1 / (dt * (law.stiffness * dt + law.damping));
+        row.bias += law.stretch * law.stiffness / (law.stiffness * dt + law.damping);
       }
+      row.plastic_bias = row.bias;
       continue;
     }
     const double came = -speed(k, coming_), comes = -speed(k, v);
@@ -66,8 +65,8 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
           {law.gap, came, comes, moving_along(k), moving(k, mechanisms), law.restitution});
     // On a turning body every step drives a joint at its limit a little beyond it.
     const double beyond = kTakenBack * std::min(law.gap, 0.0) / dt;
-    plastic_bias_[at(k)] = hits || law.gap < 0 ? beyond : law.gap / dt;
-    bias_[at(k)] = hits ? std::min(-law.restitution * came, beyond) : plastic_bias_[at(k)];
+    row.plastic_bias = hits || law.gap < 0 ? beyond : law.gap / dt;
+    row.bias = hits ? std::min(-law.restitution * came, beyond) : row.plastic_bias;
   }
 }
 
@@ -76,7 +75,7 @@ BodyCone LawRows::cone(int law, LawUse use) const {
   BodyCone out(each.limit                  ? Cone::nonnegative()
                : std::isfinite(each.bound) ? Cone::bounded(each.bound * dt_)
                                            : Cone::free());
-  out.compliance = compliance_[at(law)];
+  out.compliance = rows_[at(law)].compliance;
   for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t) {
     const auto place = t - laws.rows().begin(law);
     if (place >= 2) {
@@ -87,8 +86,8 @@ BodyCone LawRows::cone(int law, LawUse use) const {
     (place == 0 ? out.J1 : out.J2).row(0) = t->G.transpose();
   }
   out.bias[0] = use == LawUse::limits    ? std::max(each.gap, 0.0) / dt_
-                : use == LawUse::plastic ? plastic_bias_[at(law)]
-                                         : bias_[at(law)];
+                : use == LawUse::plastic ? rows_[at(law)].plastic_bias
+                                         : rows_[at(law)].bias;
   return out;
 }
 
@@ -97,17 +96,9 @@ double LawRows::start(int law, const Eigen::Vector3d* last) const {
   return laws[law].limit ? x : std::clamp(x, -N, N);
 }
 
-LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
-  const JointLaws::Law& each = laws[law];
-  LawState out;
-  out.side = at_bound(law);
-  out.impulse = impulses[at(law)];
-  out.body = moving_along(law);
-  if (each.limit) return out;
-  out.came = speed(law, coming_) - each.rate;
-  out.left = speed(law, v) - each.rate;
-  out.bound = each.bound * dt_;
-  return out;
+LawState LawRows::state(int law) const {
+  const double bound = laws[law].limit ? 0 : laws[law].bound * dt_;
+  return {at_bound(law), impulses[at(law)], bound};
 }
 
 // Sign of the impulse; 0: the bound does not hold it.

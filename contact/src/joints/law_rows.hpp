@@ -38,8 +38,7 @@ class LawRows {
   BodyCone cone(int law, LawUse use) const;
   /// Starting impulse from that of the last step; null: there is none.
   double start(int law, const Eigen::Vector3d* last) const;
-  /// v: at the end of the sub-step.
-  LawState state(int law, const std::vector<Vector6d>& v) const;
+  LawState state(int law) const;
 
  private:
   static constexpr std::uint64_t kFirstId = std::uint64_t{1} << 63;
@@ -48,7 +47,10 @@ class LawRows {
   double speed(int law, const std::vector<Vector6d>& v) const;
 
   std::vector<Vector6d> coming_;
-  std::vector<double> bias_, plastic_bias_, compliance_;
+  struct Row {
+    double bias = 0, plastic_bias = 0, compliance = 0;
+  };
+  std::vector<Row> rows_;  // of the laws
   double dt_ = 0;
 };
 

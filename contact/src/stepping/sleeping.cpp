@@ -11,13 +11,14 @@
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
+using linalg::at;
 
 namespace {
 
 constexpr double kWhile = 5;       // times sqrt(size / g)
 constexpr double kSame = 1e-9;     // of the forces: changes that wake
 constexpr double kAtFirst = 1e-3;  // the same where a body has just come to rest, of its weight
-constexpr double kInPlace = 1e-8;  // of its size: what rounding may move a neighbour
+constexpr double kStays = 1e-8;    // of its size: what rounding may move a neighbour
 
 }  // namespace
 
@@ -58,7 +59,6 @@ void Sleeping::wake(int island) {
                      [&](const StepperMemory::Neighbour& n) { return n.island == island; }),
       neighbours_.end());
   list_kept();
-  changed_ = true;
 }
 
 void Sleeping::list_kept() {
@@ -94,7 +94,7 @@ bool Sleeping::has_moved(const StepperMemory::Neighbour& n, const BodySet& bodie
   if (fixed)
     return way > 0 || speed > 0 || now.angular_velocity != n.angular_velocity ||
            bodies.orientation[i].coeffs() != n.orientation.coeffs();
-  return !(way <= kInPlace * size) || !(speed <= kAtFirst * speed_ * std::sqrt(size));
+  return !(way <= kStays * size) || !(speed <= kAtFirst * speed_ * std::sqrt(size));
 }
 
 void Sleeping::hold(const std::vector<RigidBody>& coming, double dt, BodySet& bodies) {
@@ -196,37 +196,31 @@ void Sleeping::fall_asleep(double dt, BodySet& bodies, const StepContacts& conta
 
 // Islands by contacts that press, not across bodies that do not sleep.
 void Sleeping::find_rested(double dt, BodySet& bodies, const StepContacts& contacts) {
-  const auto presses = [&](std::size_t k) {
-    return k < contacts.impulses.size() && !contacts.impulses[k].isZero(0);
-  };
+  const auto may = [&](int body) { return may_[at(body)] != 0; };
   pressing_.points.clear();
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+  loads_.clear();
+  for (std::size_t k = 0; k < std::min(contacts.impulses.size(), contacts.points.size()); ++k) {
     const PointContact& c = contacts.points[k];
-    if (presses(k) && may_[at(c.first)] != 0 && may_[at(c.second)] != 0)
-      pressing_.points.push_back(c);
+    if (contacts.impulses[k].isZero(0) || !(may(c.first) || may(c.second))) continue;
+    loads_.push_back(k);
+    if (may(c.first) && may(c.second)) pressing_.points.push_back(c);
   }
   islands_.join(bodies, pressing_);
-  const auto root = [&](const PointContact& c) {
-    return islands_.root(may_[at(c.first)] != 0 ? c.first : c.second);
-  };
-  const auto sleeper = [&](const PointContact& c) {
-    return may_[at(c.first)] != 0 || may_[at(c.second)] != 0;
+  const auto root = [&](std::size_t k) {
+    const PointContact& c = contacts.points[k];
+    return islands_.root(may(c.first) ? c.first : c.second);
   };
   rested_.assign(body_.size(), 0);
-  for (std::size_t k = 0; k < contacts.points.size(); ++k)
-    if (presses(k) && sleeper(contacts.points[k])) rested_[at(root(contacts.points[k]))] = 1;
-  for (std::size_t i = 0; i < body_.size(); ++i)
-    if (may_[i] != 0 && (asleep_[i] != 0 || !has_rested(static_cast<int>(i))))
-      rested_[at(islands_.root(static_cast<int>(i)))] = 0;
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
-    const PointContact& c = contacts.points[k];
-    if (!presses(k) || !sleeper(c)) continue;
-    for (const int body : {c.first, c.second})
-      if (held_[at(body)] != 0 && !has_rested(body)) rested_[at(root(c))] = 0;
-  }
-  for (std::size_t i = 0; i < body_.size(); ++i) {
-    const int island = islands_.root(static_cast<int>(i));
-    if (may_[i] == 0 || rested_[at(island)] == 0) continue;
+  for (const std::size_t k : loads_) rested_[at(root(k))] = 1;
+  for (int i = 0; i < bodies.size(); ++i)
+    if (may(i) && (asleep_[at(i)] != 0 || !has_rested(i))) rested_[at(islands_.root(i))] = 0;
+  for (const std::size_t k : loads_)
+    for (const int body : {contacts.points[k].first, contacts.points[k].second})
+      if (held_[at(body)] != 0 && !has_rested(body)) rested_[at(root(k))] = 0;
+  for (int body = 0; body < bodies.size(); ++body) {
+    const std::size_t i = at(body);
+    const int island = islands_.root(body);
+    if (!may(body) || rested_[at(island)] == 0) continue;
     bodies.motion[i].velocity.setZero();
     bodies.motion[i].angular_velocity.setZero();
     place_[i] = {bodies.position[i], bodies.orientation[i], bodies.motion[i]};
@@ -234,16 +228,15 @@ void Sleeping::find_rested(double dt, BodySet& bodies, const StepContacts& conta
     body_[i].island = island;
     body_[i].fresh = true;
     ++count_;
-    changed_ = true;
   }
-  for (std::size_t k = 0; k < contacts.points.size(); ++k) {
+  for (const std::size_t k : loads_) {
+    if (rested_[at(root(k))] == 0) continue;
     const PointContact& c = contacts.points[k];
-    if (!presses(k) || !sleeper(c) || rested_[at(root(c))] == 0) continue;
     kept_.points.push_back(c);
     kept_.gaps.push_back(contacts.gaps[k]);
     kept_.impulses.emplace_back(contacts.impulses[k] / dt);
     for (const int body : {c.first, c.second})
-      if (may_[at(body)] == 0) add_neighbour(body, root(c), bodies);
+      if (!may(body)) add_neighbour(body, root(k), bodies);
   }
   list_kept();
 }
@@ -270,7 +263,6 @@ void Sleeping::wake_everybody() {
   neighbours_.clear();
   woken_ = {};
   list_kept();
-  changed_ = true;
 }
 
 StepperMemory::Sleep Sleeping::memory() const { return {body_, kept_, neighbours_}; }
@@ -295,7 +287,6 @@ void Sleeping::set_memory(const StepperMemory::Sleep& m, const BodySet& bodies) 
     count_ += asleep_[i];
     place_[i] = {bodies.position[i], bodies.orientation[i], bodies.motion[i]};
   }
-  changed_ = true;
 }
 
 }  // namespace tether::contact::detail

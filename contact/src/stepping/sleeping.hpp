@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <tether/contact/stepping.hpp>
+#include <tether/linalg/index.hpp>
 #include <utility>
 #include <vector>
 
@@ -26,8 +27,6 @@ class Sleeping {
 
   int count() const { return count_; }
   const std::vector<char>& asleep() const { return asleep_; }  ///< of each body
-  /// Whether those asleep have changed since the last call.
-  bool take_changed() { return std::exchange(changed_, false); }
 
   /// After the forces of a sub-step, before joints and contacts: wakes islands whose forces or
   /// neighbours have changed, holds the others, and presses on their neighbours.
@@ -66,20 +65,17 @@ class Sleeping {
   void find_rested(double dt, BodySet& bodies, const StepContacts& contacts);
   void add_neighbour(int body, int island, const BodySet& bodies);
   bool sleeps(const PointContact& c) const {
-    return asleep_[at(c.first)] != 0 || asleep_[at(c.second)] != 0;
+    return asleep_[linalg::at(c.first)] != 0 || asleep_[linalg::at(c.second)] != 0;
   }
   int island_of(const PointContact& c) const {
-    return body_[at(asleep_[at(c.first)] != 0 ? c.first : c.second)].island;
+    return body_[linalg::at(asleep_[linalg::at(c.first)] != 0 ? c.first : c.second)].island;
   }
-  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
   std::vector<double> size_;
   double speed_, gravity_;
   std::vector<char> may_, held_;  // bodies: may sleep, are held by joints
   std::vector<StepperMemory::Rest> body_;
   std::vector<char> asleep_;
   int count_ = 0;
-  bool changed_ = false;
   std::vector<Place> place_;             // of bodies asleep
   StepContacts kept_;                    // their contacts, with forces in the place of impulses
   std::vector<std::uint64_t> kept_ids_;  // sorted
@@ -87,6 +83,7 @@ class Sleeping {
   WarmStart woken_;
   std::vector<int> woken_islands_;
   StepContacts pressing_;
+  std::vector<std::size_t> loads_;  // contacts that press on a body that may sleep
   MovingIslands islands_;
   std::vector<char> rested_;  // islands, by their root
 };

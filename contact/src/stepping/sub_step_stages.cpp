@@ -87,20 +87,15 @@ void SubStepper::choose_cut() {
   };
   for (const Impact& i : chosen)
     approaches.push_back({i.contact, i.came, i.comes, fall(contacts.points[at(i.contact)])});
-  std::size_t next = 0;  // of those chosen, which are in order
-  for (std::size_t k = 0; restitution && k < contacts.points.size(); ++k) {
-    if (next < chosen.size() && at(chosen[next].contact) == k) {
-      ++next;
-      continue;
-    }
+  impacts->each_other(restitution ? contacts.points.size() : 0, [&](std::size_t k) {
     const PointContact& c = contacts.points[k];
     const double comes = -normal_velocity(bodies.motion, c);
-    if (!(comes * now.length > contacts.gaps[k])) continue;
+    if (!(comes * now.length > contacts.gaps[k])) return;
     const Approach a{static_cast<int>(k), -normal_velocity(impacts->coming(), c), comes, fall(c)};
     if (a.more(now.length) > 0 &&
         impacts->is_impact(*near, c, a.speed(contacts.gaps[k], now.length)))
       approaches.push_back(a);
-  }
+  });
   if (cuts->choose(approaches, now.length, *near, bodies, contacts)) end = SubStepEnd::cut;
 }
 
@@ -124,16 +119,10 @@ void SubStepper::solve_problem() {
 
 // By the coefficient of contacts that hold; impacts have the other one.
 void SubStepper::hold_all() {
-  const std::vector<Impact>& struck = impacts->list();
-  std::size_t next = 0;
-  for (std::size_t k = 0; k < turned.size(); ++k) {
-    if (next < struck.size() && at(struck[next].contact) == k) {
-      ++next;
-      continue;
-    }
+  impacts->each_other(turned.size(), [&](std::size_t k) {
     const Meeting& m = near->meeting(turned[k]);
     turned[k].mu = contacts.points[k].mu = m.static_friction.value_or(turned[k].mu);
-  }
+  });
 }
 
 // Whether contacts that should hold slip, which have the other coefficient from here on. A slip is
@@ -245,7 +234,6 @@ void SubStepper::meet_others() {
 
 void SubStepper::hold_sleepers() {
   sleeping->hold(impacts->coming(), now.length, bodies);
-  if (!sleeping->take_changed()) return;
   near->set_resting(sleeping->asleep());
   const WarmStart woken = sleeping->take_woken(now.length);
   if (woken.ids.empty()) return;

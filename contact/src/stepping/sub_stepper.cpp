@@ -101,9 +101,8 @@ void SubStepper::make_solvers() {
 }
 
 void SubStepper::add_force(const char* effect, Force force) {
-  has_forces = true;
   stages.insert(
-      stages.begin() + static_cast<std::ptrdiff_t>(after_forces++),
+      stages.begin() + static_cast<std::ptrdiff_t>(first_force + forces++),
       {effect, [this, force = std::move(force)] { force(bodies, now.start, now.length); }});
 }
 
@@ -149,13 +148,12 @@ void SubStepper::make_stages() {
     stage("gravity",
           [](S& s) { s.motion.accelerate(s.now.length * *s.options.gravity, s.bodies); });
   if (falls) stage("gravity", [](S& s) { s.motion.remember_weight(s.bodies); });
-  after_forces = stages.size();
-  if (motion.any_long()) {
-    if (options.gyroscopic == Gyroscopic::explicit_step)
-      stage("gyroscopic term", [](S& s) { s.motion.gyrate_explicit(s.now.length, s.bodies); });
-    if (options.gyroscopic == Gyroscopic::implicit_step)
-      stage("gyroscopic term", [](S& s) { s.motion.gyrate_implicit(s.now.length, s.bodies); });
-  }
+  first_force = stages.size();
+  const bool explicit_or_implicit = options.gyroscopic == Gyroscopic::explicit_step ||
+                                    options.gyroscopic == Gyroscopic::implicit_step;
+  if (motion.any_long() && explicit_or_implicit)
+    stage("gyroscopic term",
+          [](S& s) { s.motion.gyrate(s.options.gyroscopic, s.now.length, s.bodies); });
   if (sleeping) stage("sleep", std::mem_fn(&S::hold_sleepers));
   if (joints) stage("joints", std::mem_fn(&S::predict_joints));
   if (falls) stage("gravity", [](S& s) { s.motion.find_falling(s.bodies); });

@@ -65,8 +65,7 @@ struct SubStepper {
   // With an accuracy or sleep, of bodies, m: the reach of their surfaces or the radius of gyration.
   std::vector<double> sizes;
   std::vector<Stage> stages;
-  std::size_t after_forces = 0;  // where the next force goes
-  bool has_forces = false;
+  std::size_t first_force = 0, forces = 0;  // the first stage of a force, and how many there are
   FreeMotion motion;
 
   // Only with meetings; impacts also with joints, the solver with laws of these.

@@ -28,7 +28,6 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
                        Gyroscopic gyroscopic)
     : equations_(std::move(equations)),
       gyroscopic_(gyroscopic),
-      has_laws_(equations_->has_laws()),
       v_(bodies.motion.size(), Vector6d::Zero()),
       g_(at(equations_->rows())),
       b_(g_.size()) {
@@ -67,7 +66,7 @@ std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& option
 }
 
 void StepJoints::list_laws(std::vector<LawState>& out) const {
-  for (int k = 0; k < laws_.laws.count(); ++k) out.push_back(laws_.state(k, v_));
+  for (int k = 0; k < laws_.laws.count(); ++k) out.push_back(laws_.state(k));
 }
 
 // Equations of the positions at time t. Factors are of no place while they are made: the caller's
@@ -134,12 +133,11 @@ void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
 }
 
 bool StepJoints::FactoredAt::is(const BodySet& bodies, double t) const {
-  if (position_.empty() || std::abs(t - time_) > 1e-9 * std::abs(t)) return false;
-  for (std::size_t i = 0; i < position_.size(); ++i)
-    if (position_[i] != bodies.position[i] ||
-        orientation_[i].coeffs() != bodies.orientation[i].coeffs())
-      return false;
-  return true;
+  return !none() && std::abs(t - time_) <= 1e-9 * std::abs(t) && position_ == bodies.position &&
+         std::equal(orientation_.begin(), orientation_.end(), bodies.orientation.begin(),
+                    [](const linalg::Quaternion& a, const linalg::Quaternion& b) {
+                      return a.coeffs() == b.coeffs();
+                    });
 }
 
 void StepJoints::take_velocities(const BodySet& bodies) {
@@ -213,7 +211,7 @@ bool StepJoints::predict(BodySet& bodies, double t, double dt) {
   }
   frequency_.follow(std::sqrt(sum) / dt);
   const bool met = reached && frequency_.resolves_change(dt);
-  if (!has_laws_) return met;
+  if (!has_laws()) return met;
   laws_.laws.clear();
   equations_->add_laws(bodies, t, laws_.laws);
   check_laws(bodies);
@@ -344,7 +342,7 @@ namespace tether::contact {
 
 void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   detail::SubStepper& s = implementation_->steps;
-  if (s.joints || s.has_forces)
+  if (s.joints || s.forces > 0)
     throw std::invalid_argument("Stepper::add_joints: once, and before add_force");
   if (!joints || joints->rows() == 0) return;
   if (joints->has_laws() && s.options.law != Law::coulomb)

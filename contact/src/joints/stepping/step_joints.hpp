@@ -38,7 +38,7 @@ class StepJoints final : public JointPart {
   void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
                    const StepContacts& contacts) override;
 
-  bool has_laws() const override { return has_laws_; }
+  bool has_laws() const override { return equations_->has_laws(); }
   void set_active(bool active) override { laws_.active = active; }
   std::vector<double>& law_impulses() override { return laws_.impulses; }
   void add_bounded(bool plastic, const BodySet& bodies,
@@ -96,7 +96,6 @@ class StepJoints final : public JointPart {
   std::unique_ptr<JointEquations> equations_;
   Gyroscopic gyroscopic_;
   Mechanisms mechanisms_;
-  bool has_laws_;
   LawRows laws_;
   const NearContacts* near_ = nullptr;  // only where a meeting names rolling friction
   bool first_islands_ = true;

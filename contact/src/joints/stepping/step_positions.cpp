@@ -95,7 +95,7 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
 
 void StepJoints::begin(BodySet& bodies, double t) {
   put_onto(bodies, t);
-  if (!has_laws_) return;
+  if (!has_laws()) return;
   take_velocities(bodies);
   laws_.remember(v_);
 }

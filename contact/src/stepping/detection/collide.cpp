@@ -8,8 +8,6 @@
 #include <tether/linalg/index.hpp>
 #include <utility>
 
-#include "stepping/detection/clip.hpp"
-
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -18,9 +16,6 @@ using Family = ShapeForm::Family;
 
 namespace {
 
-// A contact this close to the lowest point, relative to the thickness, stands for it.
-constexpr double kLow = 1e-6;
-
 // Clips a line or a face to another face, both seen along n. The identity of a cut is made of the
 // edge and of the side that cuts it.
 void clip_to_face(const Flat& face, const Vector3d& n, Flat& subject) {
@@ -28,16 +23,8 @@ void clip_to_face(const Flat& face, const Vector3d& n, Flat& subject) {
   for (int k = 0; k < face.count && subject.count > 0; ++k) {
     const Vector3d& from = face.point[at(k)];
     const Vector3d inward = turn * n.cross(Vector3d(face.point[at((k + 1) % face.count)] - from));
-    Flat kept;
-    cut_polygon(
-        at(subject.count), inward, from,
-        [&](std::size_t j) -> const Vector3d& { return subject.point[j]; },
-        [&](std::size_t j) { kept.add(subject.point[j], subject.id[j]); },
-        [&](std::size_t j, std::size_t, const Vector3d& x, bool) {
-          kept.add(x, kCut + (subject.id[j] * 61 + face.id[at(k)]) % 0x7000);
-        });
-    kept.normal = subject.normal;
-    subject = kept;
+    clip(subject, inward, from, k,
+         [&](std::size_t j) { return kCut + (subject.id[j] * 61 + face.id[at(k)]) % 0x7000; });
   }
 }
 
@@ -224,7 +211,7 @@ void manifold(const ConvexPair& pair, Flat& s, Flat& t) {
       along_lines(pair, s, t);
   }
   for (int k = before; k < pair.out.count; ++k)
-    if (pair.out.point[at(k)].gap < pair.apart.gap + kLow * thickness) return;
+    if (pair.out.point[at(k)].gap < pair.apart.gap + kNear * thickness) return;
   // No contact so far is at the lowest point. It is the point of a round surface, else the point at
   // which the shapes are nearest.
   Vector3d x = pair.apart.on_first;

@@ -1,6 +1,9 @@
 // Tether: where two shapes are near each other. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/linalg/index.hpp>
+
+#include "stepping/detection/clip.hpp"
 #include "stepping/detection/shape_form.hpp"
 
 namespace tether::contact::detail {
@@ -24,6 +27,23 @@ constexpr double kHigh = 0.1;
 
 // Features of the points where the border of a face cuts another shape's.
 constexpr int kCut = 0x800, kNoCut = 0x7f00;
+
+/// Cuts off what of a line or a face lies beyond an edge from `from`; id(j) is that of a cut beside
+/// corner j.
+template <class Id>
+void clip(Flat& subject, const Eigen::Vector3d& inward, const Eigen::Vector3d& from, int edge,
+          const Id& id) {
+  Flat kept;
+  kept.normal = subject.normal;
+  cut_polygon(
+      linalg::at(subject.count), inward, from,
+      [&](std::size_t j) -> const Eigen::Vector3d& { return subject.point[j]; },
+      [&](std::size_t j) { kept.add(subject.point[j], subject.id[j], subject.edge[j]); },
+      [&](std::size_t j, std::size_t, const Eigen::Vector3d& x, bool) {
+        kept.add(x, id(j), edge);
+      });
+  subject = kept;
+}
 
 /// Two shapes relative to a common origin, their separation, and the list that contacts go to.
 struct ConvexPair {

@@ -18,8 +18,6 @@ namespace {
 
 using linalg::at;
 
-constexpr double kCurvedNormal = 1e-6;  // radian: what the search for normals may leave
-
 bool moves(const BodySet& bodies, int body) { return bodies.mass[at(body)] > 0; }
 
 // Surfaces of a contact, from its identity; see contact_id.
@@ -257,7 +255,7 @@ void NearContacts::drop_seams(int i, int j) {
   const auto is_curved = [](ShapeKind k) { return form(k).family() == ShapeForm::Family::curved; };
   const bool on_mesh = a == ShapeKind::mesh || b == ShapeKind::mesh;
   const bool curved = !on_mesh && (is_curved(a) || is_curved(b));
-  const double angle = on_mesh ? kTie : curved ? kCurvedNormal : kUpright;
+  const double angle = on_mesh ? kTie : curved ? kNear : kUpright;
   const auto seam = [&](const NearPoint& p) {
     return parts_.is_seam(i, p.on_first, -p.normal, angle) ||
            parts_.is_seam(j, p.on_second, p.normal, angle);

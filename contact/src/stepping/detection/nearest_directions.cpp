@@ -23,7 +23,6 @@ namespace {
 // By which parts of the thickness shapes are shrunk, in turn.
 constexpr std::array<double, 4> kLess{0, 1e-3, 3e-2, 0.5};
 constexpr double kApart = 1e-4;  // of the thickness: shorter distances are rounding
-constexpr double kSnap = 1e-6;   // radian: so near a kink n lies on it
 constexpr int kIterations = 100;
 
 // Points of the difference a - b, the points of a and of b that they are made of, and weights.
@@ -232,7 +231,7 @@ Vector3d improve(const ConvexShape& a, const ConvexShape& b, Vector3d n) {
     return free;
   };
   for (int k = 0; k < 60; ++k) {
-    int free = snap(kSnap, 1e-9 * scale);
+    int free = snap(kNear, 1e-9 * scale);
     if (free == 0) return n;
     if (free < 0) {
       Vector3d same = n;

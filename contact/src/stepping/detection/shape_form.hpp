@@ -16,6 +16,13 @@ namespace tether::contact::detail {
 // Faces and lines that are parallel up to this angle (radian) touch along their whole extent.
 constexpr double kFlatAngle = 0.05;
 
+// Sizes of what is not told apart: angles in radian, and lengths in parts of the thickness or of
+// the longest extent. kNear: what an iteration leaves in a direction, and depths or distances of
+// surfaces that touch. kInPlane: distances of corners from a plane or from each other, as for hulls
+// (linalg/convex_hull.hpp); a tenth of kNear, since parts of a mesh are cut and rounded one by one.
+// kUpright: rounding, of which a direction would be made.
+constexpr double kNear = 1e-6, kInPlane = 1e-7, kUpright = 1e-9;
+
 class ConvexShape;
 struct Flat;
 struct Polyhedron;
@@ -86,17 +93,20 @@ const ShapeForm& form(ShapeKind kind);
 
 /// The feature of a surface that faces a direction: a point, the ends of a line, or the corners of
 /// a face, counterclockwise seen from outside. The `id` of a corner is the same in every step.
+/// `edge`: that of another face at which a corner was cut, -1 for an original one.
 struct Flat {
-  static constexpr int kMost = 32;
+  static constexpr int kMost = 48;
   int count = 0;
   std::array<Eigen::Vector3d, kMost> point;
-  std::array<int, kMost> id;
+  std::array<int, kMost> id, edge;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of a face, outwards
 
-  void add(const Eigen::Vector3d& p, int i) {
+  void add(const Eigen::Vector3d& p, int i, int cut_at = -1) {
     if (count == kMost) return;
-    point[static_cast<std::size_t>(count)] = p;
-    id[static_cast<std::size_t>(count++)] = i;
+    const auto k = static_cast<std::size_t>(count++);
+    point[k] = p;
+    id[k] = i;
+    edge[k] = cut_at;
   }
 };
 
@@ -151,9 +161,6 @@ class ConvexShape {
  private:
   const ShapeForm* form_;
 };
-
-// A tilt whose sine is smaller is rounding: it has no direction.
-constexpr double kUpright = 1e-9;
 
 inline double signed_one(double x) { return x < 0 ? -1 : 1; }
 

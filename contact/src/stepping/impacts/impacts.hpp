@@ -33,6 +33,16 @@ class Impacts {
   /// After the contacts are found.
   void choose(const NearContacts& near, const BodySet& bodies, double dt, StepContacts& contacts);
   const std::vector<Impact>& list() const { return list_; }
+  /// Calls visit(k) for those of so many contacts that are no impacts.
+  template <class Visit>
+  void each_other(std::size_t contacts, const Visit& visit) const {
+    std::size_t next = 0;
+    for (std::size_t k = 0; k < contacts; ++k)
+      if (next < list_.size() && static_cast<std::size_t>(list_[next].contact) == k)
+        ++next;
+      else
+        visit(k);
+  }
   /// Removes all other contacts.
   void keep_only_impacts(StepContacts& contacts);
   /// Least speed of approach, m/s, of an impact.

@@ -59,7 +59,7 @@ void Restitution::choose(const Impacts& chosen, const std::vector<Strike>& limit
     PointContact& c = contacts.points[at(i.contact)];
     // Restitution of the speed that the forces of this step add would make a body at rest hop.
     const double speed = i.restitution * std::min(i.came, i.comes);
-    bounces_.push_back({i.contact, speed, speed / i.comes});
+    bounces_.push_back({i.contact, speed / i.comes});
     if (law_ != RestitutionLaw::newton) continue;
     c.bias = -speed;
     biased_.push_back(i.contact);

@@ -39,8 +39,7 @@ class Restitution {
  private:
   struct Bounce {
     int contact;
-    double speed;  // given back, m/s
-    double part;   // of the impulse
+    double part;  // of the impulse that is given back
   };
   void add_laws(bool plastic, const BodySet& bodies, std::vector<RigidBody>& forces) const;
   void sum_energies(const BodySet& bodies);

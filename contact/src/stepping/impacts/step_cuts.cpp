@@ -15,11 +15,10 @@ namespace {
 
 using linalg::at;
 
-constexpr double kSameTime = 1e-10;  // of a part
 // Contacts that strike within this sub-step strike together: the corners of an edge that
 // rounding has turned would else be struck one by one, and turn it.
 constexpr double kTogether = 1e-3;
-constexpr double kTouches = 1e-10;  // of the size: a gap that rounding makes of none
+constexpr double kTouches = 1e-10;  // of the size, of the time: a gap that rounding makes of none
 // An approach is none below these parts of what forces add to it, and of the speeds of both points.
 // They decide where the least speed of an impact is 0.
 constexpr double kPresses = 1e-3, kRounding = 1e-6;
@@ -86,8 +85,8 @@ bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const Nea
   when_ = std::numeric_limits<double>::infinity();
   for (const double t : time_) when_ = std::min(when_, t);
   if (!std::isfinite(when_)) return false;
-  if (when_ < kSameTime * dt) when_ = 0;
-  when_ = when_ > (1 - kSameTime) * dt ? dt : when_;
+  if (when_ < kTouches * dt) when_ = 0;
+  when_ = when_ > (1 - kTouches) * dt ? dt : when_;
   const double last = when_ < dt ? when_ + kTogether * dt : std::numeric_limits<double>::max();
   for (std::size_t k = 0; k < time_.size(); ++k)
     if (time_[k] <= last) striking_.push_back(contacts.points[at(impacts[k].contact)].id);

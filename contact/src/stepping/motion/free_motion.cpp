@@ -8,6 +8,7 @@
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
+using linalg::at;
 
 namespace {
 
@@ -48,18 +49,14 @@ void FreeMotion::find_falling(const BodySet& bodies) {
     falls_[at(i)] = may_fall_[at(i)] != 0 && bodies.motion[at(i)].velocity == weight_only_[at(i)];
 }
 
-void FreeMotion::gyrate_explicit(double dt, BodySet& bodies) const {
+void FreeMotion::gyrate(Gyroscopic how, double dt, BodySet& bodies) const {
   for (const int i : long_) {
+    const Eigen::Matrix3d& inertia = bodies.inertia[at(i)];
+    const linalg::Quaternion& q = bodies.orientation[at(i)];
     Vector3d& w = bodies.motion[at(i)].angular_velocity;
-    w += gyroscopic_explicit(bodies.inertia[at(i)], bodies.inverse_inertia[at(i)],
-                             bodies.orientation[at(i)], w, dt);
-  }
-}
-
-void FreeMotion::gyrate_implicit(double dt, BodySet& bodies) const {
-  for (const int i : long_) {
-    Vector3d& w = bodies.motion[at(i)].angular_velocity;
-    w += gyroscopic_implicit(bodies.inertia[at(i)], bodies.orientation[at(i)], w, dt);
+    w += how == Gyroscopic::explicit_step
+             ? gyroscopic_explicit(inertia, bodies.inverse_inertia[at(i)], q, w, dt)
+             : gyroscopic_implicit(inertia, q, w, dt);
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <tether/contact/stepping.hpp>
+#include <tether/linalg/index.hpp>
 #include <vector>
 
 #include "stepping/motion/joint_part.hpp"
@@ -26,12 +27,12 @@ class FreeMotion {
   /// Between the weight and all other forces, and behind these.
   void remember_weight(const BodySet& bodies);
   void find_falling(const BodySet& bodies);
-  void gyrate_explicit(double dt, BodySet& bodies) const;
-  void gyrate_implicit(double dt, BodySet& bodies) const;
+  /// The gyroscopic term by an explicit or an implicit step.
+  void gyrate(Gyroscopic how, double dt, BodySet& bodies) const;
 
   void move(double dt, BodySet& bodies) const;
   /// No other force than its weight acts upon it, and no joint holds it.
-  bool falls(int body) const { return falls_[at(body)] != 0; }
+  bool falls(int body) const { return falls_[linalg::at(body)] != 0; }
   const std::vector<char>& falling() const { return falls_; }
   /// Bodies that fall: a part moves them by the velocities of its end, half of what their weight
   /// adds too far. Not in islands that anything has pressed by more than rounding does.
@@ -49,8 +50,6 @@ class FreeMotion {
   const std::vector<int>& free_long() const { return free_long_; }
 
  private:
-  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
   std::vector<int> moving_, long_;
   std::vector<int> free_, free_round_, free_long_;  // those that no joint moves
   std::vector<FreeSpin> spins_;

@@ -68,15 +68,10 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
   then_.motion.resize(count);
   moved_.assign(count, 0);
   std::uint64_t followed = ~std::uint64_t{0};  // surfaces
-  std::size_t impact = 0;
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    if (impact < impacts.list().size() && at(impacts.list()[impact].contact) == k) {
-      ++impact;
-      continue;
-    }
+  impacts.each_other(contacts.size(), [&](std::size_t k) {
     PointContact& now = contacts[k];
     const RigidBody &a = before(now.first), &b = before(now.second);
-    if (!turns(a, dt / 2) && !turns(b, dt / 2)) continue;
+    if (!turns(a, dt / 2) && !turns(b, dt / 2)) return;
     if (now.id >> 16 != followed) {
       followed = now.id >> 16;
       move(now.first, a, bodies, gyroscopic, dt / 2);
@@ -85,7 +80,7 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
       next_ = 0;
     }
     const PointContact* then = find(now.id);
-    if (then == nullptr) continue;
+    if (then == nullptr) return;
     const Vector3d u = relative_velocity(a, b, now);
     const Vector3d v =
         relative_velocity(then_.motion[at(now.first)], then_.motion[at(now.second)], *then);
@@ -96,7 +91,7 @@ void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bo
                     ? now.normal.dot(bend(now.second, now.r2) - bend(now.first, now.r1))
                     : then->normal.dot(v) - now.normal.dot(u);
     now.slip += v - u - now.normal.dot(v - u) * now.normal;
-  }
+  });
 }
 
 }  // namespace tether::contact::detail

@@ -121,7 +121,8 @@ void ClosedSurface::join_edges() {
         refuse_mesh(
             "the edge " + edge(t, k) + " of triangle " + std::to_string(t) +
             " belongs to no other triangle: the surface of a body that moves must be closed");
-      if ((normal_[at(t)] - normal_[at(other->second)]).norm() < kFlat) flat.join(t, other->second);
+      if ((normal_[at(t)] - normal_[at(other->second)]).norm() < kUpright)
+        flat.join(t, other->second);
     }
   set_planes(flat);
   for (const auto& [pair, t] : left) {

@@ -11,10 +11,9 @@
 #include <utility>
 #include <vector>
 
-namespace tether::contact::detail {
+#include "stepping/detection/shape_form.hpp"
 
-/// Nearer to a plane: in it, as for hulls (linalg/convex_hull.hpp). In units of the largest extent.
-constexpr double kInPlane = 1e-7;
+namespace tether::contact::detail {
 
 /// Throws std::invalid_argument("mesh: " + what).
 [[noreturn]] void refuse_mesh(const std::string& what);

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <tether/linalg/index.hpp>
 
-#include "stepping/detection/clip.hpp"
-
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -15,10 +13,6 @@ using linalg::at;
 namespace {
 
 constexpr double kBorder = 1e-10;  // of the longest edge: a point so near the border is inside
-constexpr double kShallow = 1e-6;  // of the thickness: in such depths every face is a way out
-constexpr double kLowest = 1e-9;   // of the thickness: a smaller difference of heights is none
-constexpr double kSame = 1e-6;     // radian: a smaller angle between directions is none
-constexpr std::size_t kMost = 48;  // corners of a clipped polygon
 
 // Identity of a contact, made of its features, which is the same in every step.
 std::uint64_t key_of(std::uint64_t kind, int a, int b) {
@@ -30,32 +24,6 @@ std::uint64_t key_of(std::uint64_t kind, int a, int b) {
   return x * 0xbf58476d1ce4e5b9;
 }
 enum Kind : std::uint64_t { kOverFace = 1, kOnEdge, kOnCorner, kTopEdge, kTopCorner };
-
-// A corner of a face or line of the body after clipping to a triangle. `edge` is the edge of the
-// triangle at which it was cut, -1 for an original corner.
-struct Cut {
-  Vector3d point;
-  int id, edge;
-};
-struct Cuts {
-  std::array<Cut, kMost> corner;
-  int count = 0;
-  void add(const Cut& c) {
-    if (at(count) < kMost) corner[at(count++)] = c;
-  }
-};
-
-void cut(const Vector3d& from, const Vector3d& inward, int edge, Cuts& all) {
-  Cuts kept;
-  cut_polygon(
-      at(all.count), inward, from,
-      [&](std::size_t j) -> const Vector3d& { return all.corner[j].point; },
-      [&](std::size_t j) { kept.add(all.corner[j]); },
-      [&](std::size_t j, std::size_t, const Vector3d& x, bool) {
-        kept.add({x, all.corner[j].id, edge});
-      });
-  all = kept;
-}
 
 }  // namespace
 
@@ -124,10 +92,11 @@ void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
       inside = n.cross(along).dot(q.on_second - c) >= -kBorder * near.longest * along.norm();
     }
     if (!inside) continue;
-    lowest = lowest || q.gap <= low + kLowest * thickness;
+    lowest = lowest || q.gap <= low + kUpright * thickness;
     plane_.point[at(over++)] = q;
   }
-  const bool sharp = near.triangle.sharp(), shallow = low >= -kShallow * thickness;
+  // In such depths every face is a way out.
+  const bool sharp = near.triangle.sharp(), shallow = low >= -kNear * thickness;
   bool face = shallow || !sharp;
   if (sharp && !(lowest && shallow) && !separate(body, near, face, out)) return;
   for (int j = 0; j < over; ++j) {
@@ -145,7 +114,7 @@ bool MeshContacts::separate(const Body& body, const Near& near, bool& face, Near
   const ConvexShape triangle(corners_, body.convex.thickness);
   Separation apart;
   if (!find_separation(body.convex, triangle, body.margin, apart)) return false;
-  if ((apart.normal - near.triangle.normal).norm() < kSame) {
+  if ((apart.normal - near.triangle.normal).norm() < kNear) {
     face = true;
     return true;
   }
@@ -171,7 +140,7 @@ bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
   const TriangleMesh::Triangle& t = near.triangle;
   std::array<double, 3> height{};
   for (int k = 0; k < 3; ++k) height[at(k)] = n.dot(near.corner[at(k)]);
-  const double least = *std::max_element(height.begin(), height.end()) - kSame * near.longest;
+  const double least = *std::max_element(height.begin(), height.end()) - kNear * near.longest;
   for (int k = 0; k < 3; ++k)
     if (height[at(k)] >= least) top.add(near.corner[at(k)], k);
   if (top.count == 3) return false;
@@ -185,7 +154,7 @@ bool MeshContacts::top_of(const Near& near, const Vector3d& n, Flat& top,
   if (t.sharp_edge[at(k)] == 0) return false;
   if (t.apex[at(k)] < 0) return true;
   const Vector3d way = mesh_.point(t.apex[at(k)]) - mesh_.point(t.corner[at(k)]);
-  return n.dot(way) <= kSame * way.norm();
+  return n.dot(way) <= kNear * way.norm();
 }
 
 // Adds the points at which a face or a line of the body passes over a sharp edge or corner of the
@@ -196,26 +165,26 @@ void MeshContacts::cut_edges(const Body& body, const Near& near, double low, Nea
   Flat flat;
   body.convex.flat(-t.normal, height, flat);
   if (flat.count < 2) return;
-  Cuts all;
-  for (int j = 0; j < flat.count; ++j) all.add({flat.point[at(j)], flat.id[at(j)], -1});
-  for (int k = 0; k < 3 && all.count > 0; ++k) {
+  for (int k = 0; k < 3 && flat.count > 0; ++k) {
     const Vector3d& from = near.corner[at(k)];
-    cut(from, t.normal.cross(near.corner[at((k + 1) % 3)] - from), k, all);
+    clip(flat, t.normal.cross(near.corner[at((k + 1) % 3)] - from), from, k,
+         [&](std::size_t j) { return flat.id[j]; });
   }
-  for (int j = 0; j < all.count; ++j) {
-    const Cut& c = all.corner[at(j)];
-    if (c.edge < 0) continue;
-    const double above = t.normal.dot(c.point - near.corner[0]);
+  for (int j = 0; j < flat.count; ++j) {
+    const Vector3d& x = flat.point[at(j)];
+    const int edge = flat.edge[at(j)];
+    if (edge < 0) continue;
+    const double above = t.normal.dot(x - near.corner[0]);
     const double gap = above - body.convex.round;
     if (!(gap < body.margin)) continue;
-    const Vector3d foot = c.point - above * t.normal;
+    const Vector3d foot = x - above * t.normal;
     std::uint64_t key = 0;
-    if (t.sharp_edge[at(c.edge)] != 0) key = key_of(kOnEdge, t.edge[at(c.edge)], c.id);
-    for (const int k : {c.edge, (c.edge + 1) % 3})
-      if ((foot - near.corner[at(k)]).norm() <= kLowest * near.longest)
+    if (t.sharp_edge[at(edge)] != 0) key = key_of(kOnEdge, t.edge[at(edge)], flat.id[at(j)]);
+    for (const int k : {edge, (edge + 1) % 3})
+      if ((foot - near.corner[at(k)]).norm() <= kUpright * near.longest)
         key = t.sharp_corner[at(k)] != 0 ? key_of(kOnCorner, t.corner[at(k)], 0) : 0;
     if (key != 0)
-      add(c.point - body.convex.round * t.normal, t.normal, gap,
+      add(x - body.convex.round * t.normal, t.normal, gap,
           key + 0x9e3779b97f4a7c15 * static_cast<std::uint64_t>(t.patch), out);
   }
 }

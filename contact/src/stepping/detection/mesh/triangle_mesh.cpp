@@ -16,8 +16,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kBelow = 1e-7;  // radian: neighbours of a top may rise by this angle
-
 struct HalfEdge {
   int low, high;  // corners
   int triangle, side;
@@ -82,7 +80,7 @@ void TriangleMesh::join_edges() {
     return std::tie(a.low, a.high, a.triangle, a.side) <
            std::tie(b.low, b.high, b.triangle, b.side);
   });
-  std::vector<std::array<int, 2>> flat;
+  linalg::DisjointSets flat(size());
   int number = 0;
   for (std::size_t first = 0, end = 0; first < halves.size(); first = end, ++number) {
     while (end < halves.size() && halves[end].low == halves[first].low &&
@@ -99,17 +97,11 @@ void TriangleMesh::join_edges() {
     const Vector3d way = point(s.apex[at(h.side)]) - from;
     const double rise = s.normal.dot(way), out = (way - along.dot(way) * along).norm();
     const bool ahead = s.normal.dot(t.normal) > 0;
-    if (ahead && std::abs(rise) <= kFlat * out) flat.push_back({h.triangle, o.triangle});
-    const bool bends_away = rise < -kFlat * out || (!ahead && rise <= kFlat * out);
+    if (ahead && std::abs(rise) <= kUpright * out) flat.join(h.triangle, o.triangle);
+    const bool bends_away = rise < -kUpright * out || (!ahead && rise <= kUpright * out);
     s.sharp_edge[at(h.side)] = t.sharp_edge[at(o.side)] = bends_away ? 1 : 0;
   }
-  find_patches(flat);
-}
-
-void TriangleMesh::find_patches(const std::vector<std::array<int, 2>>& flat) {
-  linalg::DisjointSets sets(size());
-  for (const std::array<int, 2>& each : flat) sets.join(each[0], each[1]);
-  for (int t = 0; t < size(); ++t) triangles_[at(t)].patch = sets.root(t);
+  for (int t = 0; t < size(); ++t) triangles_[at(t)].patch = flat.root(t);
 }
 
 void TriangleMesh::mark_corners() {
@@ -135,7 +127,7 @@ void TriangleMesh::mark_corners() {
 bool TriangleMesh::is_top(int corner, const Vector3d& n) const {
   for (std::size_t k = start_[at(corner)]; k < start_[at(corner) + 1]; ++k) {
     const Vector3d way = point(neighbours_[k]) - point(corner);
-    if (n.dot(way) > kBelow * way.norm()) return false;
+    if (n.dot(way) > kInPlane * way.norm()) return false;
   }
   return true;
 }

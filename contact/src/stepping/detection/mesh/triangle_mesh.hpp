@@ -5,9 +5,10 @@
 #include <array>
 #include <vector>
 
+#include "stepping/detection/shape_form.hpp"
+
 namespace tether::contact::detail {
 
-constexpr double kFlat = 1e-9;     // radian: smaller bends between triangles are rounding
 constexpr double kNoArea = 1e-14;  // least ratio of twice the area to the longest edge squared
 
 /// Joins points that are equal to the last bit: the index of each in `different`.
@@ -45,7 +46,6 @@ class TriangleMesh {
   void add_triangles(const std::vector<Eigen::Vector3d>& points,
                      const std::vector<std::array<int, 3>>& triangles);
   void join_edges();
-  void find_patches(const std::vector<std::array<int, 2>>& flat);
   void mark_corners();
 
   std::vector<Eigen::Vector3d> points_;

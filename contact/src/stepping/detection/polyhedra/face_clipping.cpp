@@ -13,7 +13,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSame = 1e-7;  // of the smaller thickness: nearer corners count as one
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -47,7 +46,7 @@ void FaceClipper::clip(const Placed& reference, int face, const Placed& other, d
                        double margin, double size, int mark, NearPoints& out) {
   const Vector3d& n = reference.face(face).normal;
   const double offset = reference.face(face).offset;
-  const double same = kSame * size;
+  const double same = kInPlane * size;
   const int opposite = lowest_face(other, n, same);
   if (opposite < 0) return;
   int number = 0;  // of the pair of pieces

@@ -95,10 +95,11 @@ EdgeAxis best_edges(const Placed& a, const Placed& b, double rounding) {
     const Vector3d u = a.vertex(e.to) - a.vertex(e.from);
     for (int j = 0; j < static_cast<int>(b.shape->edges.size()); ++j) {
       const Polyhedron::Edge& g = b.shape->edges[at(j)];
-      const Vector3d m1 = -b.face(g.left).normal, m2 = -b.face(g.right).normal;
+      const double s1 = b.face(g.left).normal.dot(u), s2 = b.face(g.right).normal.dot(u);
+      if (s1 * s2 >= 0) continue;
       const Vector3d v = b.vertex(g.to) - b.vertex(g.from);
-      const double s1 = m1.dot(u), s2 = m2.dot(u), t1 = n1.dot(v), t2 = n2.dot(v);
-      if (s1 * s2 >= 0 || t1 * t2 >= 0 || s1 * t2 <= 0) continue;
+      const double t1 = n1.dot(v), t2 = n2.dot(v);
+      if (t1 * t2 >= 0 || s1 * t2 >= 0) continue;
       Vector3d n = u.cross(v);
       const double length = n.norm();
       if (!(length > 1e-6 * u.norm() * v.norm())) continue;
@@ -226,7 +227,6 @@ Nearest nearest_point(const Placed& b, const Vector3d& c) {
 // The points at which the axis of a capsule, from .. from + u, passes an edge between its ends.
 void axis_on_edges(const Vector3d& from, const Vector3d& u, double radius, const Placed& b,
                    double margin, NearPoints& out) {
-  constexpr double kAlong = 1e-9;  // radian: an axis within this angle lies along a face
   for (std::size_t k = 0; k < b.shape->edges.size(); ++k) {
     const Polyhedron::Edge& e = b.shape->edges[k];
     const Vector3d &q = b.vertex(e.from), v = b.vertex(e.to) - q;
@@ -241,7 +241,7 @@ void axis_on_edges(const Vector3d& from, const Vector3d& u, double radius, const
     n /= distance;
     // The edge is nearest if the direction to the axis lies between the normals of its faces. It
     // may coincide with one of them where the capsule lies flat on a face and reaches beyond it.
-    const double slack = kAlong * v.norm();
+    const double slack = kUpright * v.norm();
     const double left = n.dot(b.face(e.left).normal.cross(v));
     const double right = n.dot(b.face(e.right).normal.cross(v));
     if (std::min(left, right) > slack || std::max(left, right) < -slack) continue;

@@ -16,10 +16,6 @@ using linalg::at;
 
 namespace {
 
-// Surfaces nearer to each other than this part of their extent touch. Ten times what the hull takes
-// for one plane, since parts of a mesh are cut and rounded one by one.
-constexpr double kTouch = 1e-6;
-
 double extent(const Polyhedron& p) {
   Vector3d low = p.vertices[0], high = low;
   for (const Vector3d& v : p.vertices) {
@@ -103,7 +99,7 @@ void mark_edges(Polyhedron& a, Polyhedron::Face::Piece& piece, const Vector3d& n
 
 // Marks the edges of the open pieces of `a` beyond which an open piece of b goes on in the plane.
 void mark_seams(Polyhedron& a, const Pose& A, const Polyhedron& b, const Pose& B) {
-  const double same = kTouch * std::max(extent(a), extent(b));
+  const double same = kNear * std::max(extent(a), extent(b));
   const Eigen::Matrix3d R = A.rotation.transpose() * B.rotation;
   const Vector3d move = A.rotation.transpose() * (B.position - A.position);
   for (Polyhedron::Face& f : a.faces)
@@ -122,7 +118,7 @@ void mark_seams(Polyhedron& a, const Pose& A, const Polyhedron& b, const Pose& B
 
 // Takes from the open pieces of `a` what a face of b lies against. Returns whether anything was.
 bool cover(Polyhedron& a, const Pose& A, const Polyhedron& b, const Pose& B) {
-  const double same = kTouch * std::max(extent(a), extent(b));
+  const double same = kNear * std::max(extent(a), extent(b));
   std::vector<Vector3d> of_b;  // in the axes of a
   for (const Vector3d& v : b.vertices)
     of_b.push_back(A.rotation.transpose() * (B.position + B.rotation * v - A.position));
@@ -173,7 +169,7 @@ std::vector<std::vector<int>> find_seams(std::vector<Polyhedron>& parts,
 // Whether b has the point x, and reaches above the plane through it across n.
 bool rises_above(const Polyhedron& b, const Pose& B, const Vector3d& x, const Vector3d& n) {
   const Vector3d p = B.rotation.transpose() * (x - B.position), m = B.rotation.transpose() * n;
-  const double same = kTouch * extent(b);
+  const double same = kNear * extent(b);
   for (const Polyhedron::Face& f : b.faces)
     if (f.normal.dot(p) - f.offset > same) return false;
   return std::any_of(b.vertices.begin(), b.vertices.end(),
@@ -192,7 +188,7 @@ Vector3d into(const Polyhedron& a, const Pose& A, const Vector3d& x) {
 bool is_on_open_piece(const Polyhedron& a, const Pose& A, const Vector3d& x, const Vector3d& n,
                       double angle) {
   const Vector3d p = A.rotation.transpose() * (x - A.position), m = A.rotation.transpose() * n;
-  const double same = kTouch * extent(a);
+  const double same = kNear * extent(a);
   for (const Polyhedron::Face& f : a.faces) {
     if (!(f.normal.dot(m) > 1 - 0.5 * angle * angle)) continue;
     for (const Polyhedron::Face::Piece& piece : f.open)
