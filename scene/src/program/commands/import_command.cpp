@@ -8,12 +8,13 @@ namespace tether::scene {
 
 namespace {
 
+using Robot = import::ImportOptions;
+
 struct ImportArguments {
-  std::string file, out = "-", base, files;
+  std::string file, out = "-", base;
   std::vector<std::string> joints, held, controls;
-  std::optional<double> ground, friction, density;
-  double height = 0, end = 1;
-  bool no_joint_laws = false, mend = false, hulls = false, strict = false, force = false;
+  Robot robot;
+  bool no_joint_laws = false, strict = false, force = false;
 };
 
 /// NAME=VALUE; a name may have an equals sign, a value has none.
@@ -28,37 +29,28 @@ std::pair<std::string, double> read_named(const char* option, const std::string&
   return {word.substr(0, equals), *value};
 }
 
-import::ImportOptions options_of(const ImportArguments& a){import::ImportOptions out;
-out.base = a.base == "fixed"  ? import::Base::fixed
-           : a.base == "free" ? import::Base::free
-                              : import::Base::as_file;
-for (const std::string& word : a.joints)
-  out.positions.push_back(read_named("--joint", word, "a position in rad or m"));
-for (const std::string& word : a.controls)
-  out.controls.push_back(read_named("--control", word, "a number"));
-out.held.insert(a.held.begin(), a.held.end());
-for (const auto& [name, number] : {std::pair{"--height", a.height},
-                                   {"--ground", a.ground.value_or(0)},
-                                   {"--friction", a.friction.value_or(0)}})
-  if (!std::isfinite(number) || std::abs(number) > 1e9)
-    throw std::invalid_argument(fmt::format("{} {}: must be a finite number", name, number));
-if (a.friction && *a.friction < 0)
-  throw std::invalid_argument(fmt::format("--friction {}: must be >= 0", *a.friction));
-out.height = a.height;
-out.ground = a.ground;
-out.friction = a.friction;
-out.joint_laws = !a.no_joint_laws;
-out.mend = a.mend;
-out.density = a.density;
-out.hulls = a.hulls;
-out.files = a.files;
-out.end = a.end;
-return out;
-}  // namespace
+Robot options_of(const ImportArguments& a) {
+  Robot out = a.robot;
+  if (!a.base.empty()) out.base = a.base == "fixed" ? import::Base::fixed : import::Base::free;
+  for (const std::string& word : a.joints)
+    out.positions.push_back(read_named("--joint", word, "a position in rad or m"));
+  for (const std::string& word : a.controls)
+    out.controls.push_back(read_named("--control", word, "a number"));
+  out.held.insert(a.held.begin(), a.held.end());
+  out.joint_laws = !a.no_joint_laws;
+  for (const auto& [name, number] : {std::pair{"--height", out.height},
+                                     {"--ground", out.ground.value_or(0)},
+                                     {"--friction", out.friction.value_or(0)}})
+    if (!std::isfinite(number) || std::abs(number) > 1e9)
+      throw std::invalid_argument(fmt::format("{} {}: must be a finite number", name, number));
+  if (out.friction && *out.friction < 0)
+    throw std::invalid_argument(fmt::format("--friction {}: must be >= 0", *out.friction));
+  return out;
+}
 
 /// Said once more on the standard error, since a scene may leave through a pipe.
 int write_import(const ImportArguments& a) {
-  const import::ImportOptions options = options_of(a);
+  const Robot options = options_of(a);
   Output scene;
   scene["state"] = a.out == "-" ? "" : a.out;
   formats::check_names(scene, {a.file == "-" ? "" : a.file});
@@ -70,7 +62,7 @@ int write_import(const ImportArguments& a) {
   return a.strict && !made.remarks.empty() ? kNotMet : kGood;
 }
 
-}  // namespace tether::scene
+}  // namespace
 
 void add_import_command(CLI::App& app, int* status) {
   auto a = std::make_shared<ImportArguments>();
@@ -80,7 +72,7 @@ void add_import_command(CLI::App& app, int* status) {
   command->add_option("--out", a->out, "The scene [-, the standard output]");
   command->add_option("--base", a->base, "The base: fixed or free [URDF: fixed; MJCF: as it says]")
       ->check(CLI::IsMember({"fixed", "free"}));
-  command->add_option("--height", a->height, "Raise the robot by this, m");
+  command->add_option("--height", a->robot.height, "Raise the robot by this, m");
   command->add_option("--joint", a->joints, "Start: NAME=VALUE, rad or m; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--control", a->controls, "Of an actuator: NAME=VALUE [0]; may be repeated")
@@ -89,21 +81,23 @@ void add_import_command(CLI::App& app, int* status) {
       ->allow_extra_args(false);
   command->add_flag("--no-joint-laws", a->no_joint_laws,
                     "Leave out limits and friction of joints, which need the stepping engine");
-  command->add_option("--ground", a->ground,
+  command->add_option("--ground", a->robot.ground,
                       "Add ground at this height, m, that the robot touches");
-  command->add_option("--friction", a->friction, "Of all contacts [MJCF: as it says; URDF: 1]");
-  command->add_flag("--mend", a->mend, "Change inertias that no body has to the nearest ones");
-  command->add_flag("--hulls", a->hulls,
+  command->add_option("--friction", a->robot.friction,
+                      "Of all contacts [MJCF: as it says; URDF: 1]");
+  command->add_flag("--mend", a->robot.mend,
+                    "Change inertias that no body has to the nearest ones");
+  command->add_flag("--hulls", a->robot.hulls,
                     "Meshes of a URDF touch as their convex hulls, not as convex parts");
   command
-      ->add_option("--density", a->density,
+      ->add_option("--density", a->robot.density,
                    "Links of a URDF without <inertial> weigh as their shapes, kg/m^3")
       ->check(positive_number());
   command
-      ->add_option("--files", a->files,
+      ->add_option("--files", a->robot.files,
                    "Folder that meshes and included files lie below [that of the robot]")
       ->check(CLI::ExistingDirectory);
-  command->add_option("--end", a->end, "End of the run, s [1]")->check(positive_number());
+  command->add_option("--end", a->robot.end, "End of the run, s [1]")->check(positive_number());
   command->add_flag("--strict", a->strict, "Exit code 1 if anything was left out or changed");
   command->add_flag("--force", a->force, "Replace a file that is there");
   command->footer(
