@@ -58,8 +58,8 @@ namespace tether::scene {
 
 static_assert(word(kJointWords.back().second) != "?" &&
               word(InvariantKind::angular_momentum) == "angular_momentum" &&
-              word(Formulation::stabilised_index2) == "stabilised_index2" &&
-              word(OnFailure::warn) == "warn" && word(Otherwise::stepping) == "stepping" &&
+              word(Formulation::index0) == "index0" && word(OnFailure::warn) == "warn" &&
+              word(Otherwise::stepping) == "stepping" &&
               word(Quantity::spring_force) == "spring_force");
 
 }  // namespace tether::scene

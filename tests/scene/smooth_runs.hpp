@@ -48,8 +48,7 @@ inline double in_plane(const Vector3d& p, double x, double y) {
   return std::hypot(p.x() - x, p.y() - y);
 }
 
-inline constexpr Formulation kForms[] = {Formulation::index1, Formulation::index0,
-                                         Formulation::stabilised_index2};
+inline constexpr Formulation kForms[] = {Formulation::index1, Formulation::index0};
 
 // Every form and tolerance: error below ten times the tolerance, constraints kept, steps bounded.
 inline void meets(const char* what, const std::function<Scene(double)>& make, double end,

@@ -282,6 +282,18 @@ TEST_CASE("event: dominoes that share their forces fall as symmetric ones do") {
   }
 }
 
+namespace {
+
+/// Contacts in one block after the other, of a normal and two tangents each.
+tether::scene::event::FrictionProblem of_contacts(const Eigen::MatrixXd& A,
+                                                  const Eigen::VectorXd& b, double mu) {
+  tether::scene::event::FrictionProblem out{A, b, {}};
+  for (int i = 0; i < b.size(); i += 3) out.parts.push_back({i, 2, i, mu});
+  return out;
+}
+
+}  // namespace
+
 TEST_CASE("event: corners that contradict each other by an error of the state hold all the same") {
   // A box that falls on its four corners, sideways.
   Eigen::MatrixXd J(12, 6);
@@ -298,8 +310,7 @@ TEST_CASE("event: corners that contradict each other by an error of the state ho
   const Eigen::MatrixXd A = J * inverse.asDiagonal() * J.transpose();
   Eigen::VectorXd b = -J * u;
   for (int i = 0; i < 12; ++i) b[i] += 1e-10 * std::sin(3.0 * i);
-  const event::FrictionSolution answer = event::solve_impact(
-      event::FrictionProblem::of_contacts(A, b, Eigen::VectorXd::Constant(4, 0.5)), 1e-8);
+  const event::FrictionSolution answer = event::solve_impact(of_contacts(A, b, 0.5), 1e-8);
   REQUIRE(answer.solved);
   for (int k = 0; k < 4; ++k)
     CHECK(answer.regimes[static_cast<std::size_t>(k)] == tether::contact::Regime::sticking);
@@ -308,8 +319,7 @@ TEST_CASE("event: corners that contradict each other by an error of the state ho
   // Two of the four carry more, by the moment of the friction: each side the same.
   CHECK(std::abs(answer.x[0] - answer.x[3] - answer.x[6] + answer.x[9]) < 1e-8);
   // Across the cone they slide, all in one direction, none of them lifted by another's choice.
-  const event::FrictionSolution slides = event::solve_impact(
-      event::FrictionProblem::of_contacts(A, b, Eigen::VectorXd::Constant(4, 0.1)), 1e-8);
+  const event::FrictionSolution slides = event::solve_impact(of_contacts(A, b, 0.1), 1e-8);
   REQUIRE(slides.solved);
   for (int k = 0; k < 4; ++k) {
     CHECK(slides.regimes[static_cast<std::size_t>(k)] == tether::contact::Regime::sliding);
@@ -322,13 +332,12 @@ TEST_CASE("event: corners that contradict each other by an error of the state ho
 TEST_CASE("event: a contact that the joints lock carries nothing") {
   namespace event = tether::scene::event;
   Eigen::MatrixXd A = Eigen::MatrixXd::Identity(6, 6);
-  Eigen::VectorXd b(6), mu = Eigen::VectorXd::Constant(2, 0.5);
+  Eigen::VectorXd b(6);
   b << 1, 0.1, -0.2, 3e-17, 0, 1e-17;
   for (const double left : {0.0, 1e-16}) {
     CAPTURE(left);
     A.bottomRightCorner(3, 3) = left * Eigen::Matrix3d::Identity();
-    const event::FrictionSolution answer =
-        event::solve_friction(event::FrictionProblem::of_contacts(A, b, mu));
+    const event::FrictionSolution answer = event::solve_friction(of_contacts(A, b, 0.5));
     REQUIRE(answer.solved);
     CHECK((answer.x.head(3) - b.head(3)).norm() < 1e-14);
     CHECK(answer.x.tail(3).norm() == 0);

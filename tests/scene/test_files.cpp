@@ -48,7 +48,7 @@ TEST_CASE("every field of a scene is read") {
   CHECK(*s.gravity == Vector3d(0.1, -0.2, -9.81));
   REQUIRE(s.smooth);
   CHECK(s.smooth->tolerance == 1e-8);
-  CHECK(s.smooth->formulation == Formulation::stabilised_index2);
+  CHECK(s.smooth->formulation == Formulation::index0);
   CHECK_FALSE(s.smooth->projection);
   CHECK(s.smooth->max_step == 0.01);
   CHECK(s.smooth->max_steps == 5000);
@@ -196,7 +196,7 @@ TEST_CASE("a wrong value is named with its place, field, value and what is allow
       {"name = \"everything\"", "name = 3", "scene: name", "3", "text"},
       {"name = \"everything\"", "name = \"a,b\"", "scene: name", "a,b", "comma"},
       {"tolerance = 1e-8", "tolerance = 0", "smooth: tolerance", "0", "1e-14"},
-      {"\"stabilised_index2\"", "\"index3\"", "smooth: formulation", "index3", "index1, index0"},
+      {"\"index0\"", "\"index3\"", "smooth: formulation", "index3", "index1, index0"},
       {"projection = false", "projection = 0", "smooth: projection", "0", "true or false"},
       {"radius = 0.1", "radius = 0", "body \"rod\": radius", "0", "> 0, m"},
       {"density = 1234.5", "density = 1\nmass = 1", "body \"rod\": density", "1", "not both"},

@@ -129,7 +129,7 @@ TEST_CASE("a restart anywhere gives the bits of a run in one piece: shipped scen
 }
 
 TEST_CASE("a restart anywhere gives the bits of a run in one piece: variations") {
-  for (const char* form : {"index1", "index0", "stabilised_index2"})
+  for (const char* form : {"index1", "index0"})
     for (const double part : {0.1, 0.513, 0.98}) {
       check_cut(parse_scene(chain(1, form, 1e-6), "chain.toml"), part);
       check_cut(parse_scene(chain(3, form, 1e-4), "chain.toml"), part);

@@ -174,8 +174,7 @@ TEST_CASE("energy is kept with the work of wind and thrusters counted, in every 
     Scene scene = surrounded(text);
     scene.invariants.emplace_back();
     scene.invariants.back().kind = InvariantKind::energy;
-    for (const Formulation form :
-         {Formulation::index1, Formulation::index0, Formulation::stabilised_index2}) {
+    for (const Formulation form : {Formulation::index1, Formulation::index0}) {
       scene.smooth.emplace().tolerance = 1e-8;
       scene.smooth->formulation = form;
       const auto engine = make_engine(scene);

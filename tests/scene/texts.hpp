@@ -13,7 +13,7 @@ gravity = [0.1, -0.2, -9.81]
 
 [smooth]
 tolerance = 1e-8
-formulation = "stabilised_index2"
+formulation = "index0"
 projection = false
 max_step = 0.01
 max_steps = 5000

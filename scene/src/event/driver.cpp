@@ -25,23 +25,22 @@ double local_tolerance(double tolerance) {
   return std::max(wanted_tolerance(tolerance), kLeastLocal);
 }
 
+// A part of it, at most the whole.
+double part_of_tolerance(double tolerance, double part) {
+  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, part));
+}
+
 // From a bounce on: an error of the height is one of the time of the next impact, over its speed.
 double flight_tolerance(double tolerance, double speed) {
-  const double wanted = wanted_tolerance(tolerance), local = local_tolerance(tolerance);
-  if (wanted >= kTight) return local;
-  return std::min(local, std::max(kLeastInFlight, wanted * std::min(1.0, speed)));
+  const bool tight = wanted_tolerance(tolerance) < kTight;
+  return tight ? part_of_tolerance(tolerance, speed) : kInfinity;
 }
 
 // To an impact with this speed that does not end a bounce. Errors of gaps are those of its time,
 // over the speed; what the phase before has left is a part of the tolerance.
 double graze_tolerance(double tolerance, double speed) {
   constexpr double kSlow = 0.04;
-  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, speed / kSlow));
-}
-
-// Tolerance of IDA after a slip begins at rest with this acceleration.
-double turn_tolerance(double tolerance, double acceleration) {
-  return std::max(kLeastInFlight, wanted_tolerance(tolerance) * std::min(1.0, acceleration));
+  return part_of_tolerance(tolerance, speed / kSlow);
 }
 
 constexpr long kMostAtOneTime = 300;
@@ -193,7 +192,8 @@ void Driver::advance(double t, const std::function<bool()>& interrupted,
       if (interrupted && interrupted()) return;
       continue;
     }
-    if (phase_->counts().steps >= kAnchor || phase_->is_at_end() || rows_are_weak_) {
+    if (phase_->counts().steps >= kAnchor || phase_->is_at_end() ||
+        (phase_->step_end() > 0 && phase_->has_weak_rows())) {
       anchor();
       continue;
     }
@@ -203,10 +203,7 @@ void Driver::advance(double t, const std::function<bool()>& interrupted,
     check_pace(t);
     next_ = watcher_.first_zero(*phase_);
     if (repeat_phase()) continue;
-    if (!next_) {
-      turn_slips();
-      rows_are_weak_ = phase_->has_weak_rows();
-    }
+    if (!next_) turn_slips();
     if (excess) find_excess(excess);
   }
 }
@@ -303,19 +300,19 @@ void Driver::anchor() {
 }
 
 Driver::Memory Driver::memory() const {
-  std::vector<int> axes;
-  for (int i = 0; i < model_.contacts(); ++i) axes.push_back(model_.axis(i));
-  return {event_time_,
-          motion_.kept_energy(),
-          y_,
-          modes_,
-          motion_.levels(),
-          bounces_,
-          axes,
-          lifted_,
-          at_one_time_,
-          counts_.events,
-          counts_.impacts};
+  Memory out{event_time_,
+             motion_.kept_energy(),
+             y_,
+             modes_,
+             motion_.levels(),
+             bounces_,
+             {},
+             lifted_,
+             at_one_time_,
+             counts_.events,
+             counts_.impacts};
+  for (int i = 0; i < model_.contacts(); ++i) out.axes.push_back(model_.axis(i));
+  return out;
 }
 
 Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
@@ -369,17 +366,6 @@ void Driver::turn_slips() {
   }
 }
 
-void Driver::record(EventKind kind, int contact, double before, double after, double lost) {
-  EventRecord r;
-  r.time = event_time_;
-  r.kind = kind;
-  r.contact = contact;
-  r.before = before;
-  r.after = after;
-  r.lost = lost;
-  events_.push_back(r);
-}
-
 void Driver::handle(const Zero& zero) {
   paced_ = {};
   const double now = phase_->start() + zero.time;
@@ -403,20 +389,17 @@ void Driver::handle(const Zero& zero) {
   else if (zero.what != Watch::support)
     record(zero.what == Watch::normal_force ? EventKind::lift
            : zero.what == Watch::border     ? EventKind::border
-           : zero.what == Watch::cone       ? slip_begins(zero.contact)
-                                            : slip_ends(zero.contact),
-           zero.contact, 0, 0, 0);
+                                            : slip_of(zero.contact, zero.what == Watch::cone),
+           zero.contact);
   std::vector<ContactMode> modes = decide(close, closing ? Left() : Left{zero.contact, zero.what});
   if (zero.what == Watch::support) record_changes(modes_before, modes, zero.lag);
   motion_.choose(event_time_, y_, std::move(modes));
   begin_phase();
 }
 
-EventKind Driver::slip_begins(int contact) const {
-  return model_.law(contact).is_moment() ? EventKind::roll : EventKind::slip;
-}
-EventKind Driver::slip_ends(int contact) const {
-  return model_.law(contact).is_moment() ? EventKind::roll_stop : EventKind::stop;
+EventKind Driver::slip_of(int contact, bool begins) const {
+  if (model_.law(contact).is_moment()) return begins ? EventKind::roll : EventKind::roll_stop;
+  return begins ? EventKind::slip : EventKind::stop;
 }
 
 // Records the changes of mode of contacts that share their forces.
@@ -427,10 +410,7 @@ void Driver::record_changes(const std::vector<ContactMode>& before,
     const int contact = static_cast<int>(i);
     const bool lifts = after[i].mode == Mode::open;
     if (lifts && model_.law(contact).is_moment()) continue;
-    record(lifts                          ? EventKind::lift
-           : after[i].mode == Mode::slide ? slip_begins(contact)
-                                          : slip_ends(contact),
-           contact, 0, 0, 0);
+    record(lifts ? EventKind::lift : slip_of(contact, after[i].mode == Mode::slide), contact);
     events_.back().time -= lag;
   }
 }
@@ -489,7 +469,6 @@ void Driver::settle_velocities() {
 // on with the same bits.
 void Driver::start_phase(double most) {
   modes_ = motion_.modes();
-  rows_are_weak_ = false;
   model_.begin_anew(event_time_);
   motion_.choose(event_time_, y_, modes_);
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
@@ -503,7 +482,7 @@ void Driver::start_phase(double most) {
                      rate > bands().approach(i);
     if (leaving[at(i)]) local = std::min(local, flight_tolerance(options_.tolerance, rate));
   }
-  local = std::min(local, turn_tolerance(options_.tolerance, slowest_turn()));
+  local = std::min(local, part_of_tolerance(options_.tolerance, slowest_turn()));
   if (phase_) counts_ += phase_->counts();
   phase_.reset();
   const double first = longest_first_step(leaving);

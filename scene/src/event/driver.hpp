@@ -22,15 +22,15 @@ struct EventRecord {
   double time = 0;
   EventKind kind = EventKind::impact;
   int contact = -1;
-  double before = 0, after = 0;                       ///< normal velocities
+  double before = 0, after = 0;  ///< normal velocities
+  double lost = 0;               ///< energy of all contacts of this instant, in its first record
   Eigen::Vector3d impulse = Eigen::Vector3d::Zero();  ///< on the first body, world axes
-  double lost = 0;  ///< energy of all contacts of this instant, in its first record
 };
 
 struct DriverOptions {
   double tolerance = 1e-6;  ///< of the motion, in the units of the model
   double max_step = 0;      ///< s; 0: free
-  bool in_turn = false;     ///< contact::SimultaneousImpacts
+  contact::SimultaneousImpacts simultaneous = contact::SimultaneousImpacts::together;
   long max_events = 1000000;
   long max_steps = 100000000;  ///< of IDA
   double end = 0;              ///< of the run, s; 0: unknown, and storms are not bounded
@@ -120,7 +120,8 @@ class Driver {
     int contact = -1;
     std::optional<Watch> by;
   };
-  std::vector<ContactMode> decide(const std::vector<int>& touching, const Left& left);
+  std::vector<ContactMode> decide(const std::vector<int>& touching, const Left& left,
+                                  bool may_jam = true);
   std::vector<int> staying(const std::vector<int>& touching, const Left& left);
   std::vector<VectorXd> slides_of(const ContactRows& rows, const VectorXd& velocities,
                                   const Left& left);
@@ -137,9 +138,10 @@ class Driver {
   double slowest_turn();
   double longest_first_step(const std::vector<bool>& leaving);
   void turn_slips();
-  EventKind slip_begins(int contact) const;
-  EventKind slip_ends(int contact) const;
-  void record(EventKind kind, int contact, double before, double after, double lost);
+  EventKind slip_of(int contact, bool begins) const;
+  void record(EventKind kind, int contact, double before = 0, double after = 0, double lost = 0) {
+    events_.push_back({event_time_, kind, contact, before, after, lost});
+  }
   void record_changes(const std::vector<ContactMode>& before, const std::vector<ContactMode>& after,
                       double lag);
   [[noreturn]] void fail(const std::string& what) const;
@@ -154,7 +156,6 @@ class Driver {
   VectorXd y_;                      // at the start of the phase
   std::vector<ContactMode> modes_;  // there; directions of slip turn since
   std::unique_ptr<Phase> phase_;
-  bool rows_are_weak_ = false;  // of joints, those in use
   std::optional<Zero> next_;
   double above_from_ = kInfinity;  // since the start of the phase
   std::vector<Bounces> bounces_;
@@ -170,7 +171,6 @@ class Driver {
   } storm_;  // where the work was checked last
   long at_one_time_ = 0;
   std::vector<bool> lifted_;  // at the time of the last event, whose forces vanished
-  bool jammed_ = false;       // at this event
   Struck struck_;             // empty: nobody asks
 };
 

@@ -25,7 +25,7 @@ DriverOptions driver_options(const Scene& scene, double time_unit) {
   DriverOptions out;
   out.tolerance = o.tolerance;
   out.max_step = effects::longest_step(scene, o.max_step);
-  out.in_turn = scene.simultaneous_impacts == contact::SimultaneousImpacts::in_turn;
+  out.simultaneous = scene.simultaneous_impacts;
   out.max_events = o.max_events;
   out.max_steps = o.max_steps;
   out.end = scene.end / time_unit;
@@ -76,8 +76,8 @@ class EventEngine : public ResumableEngine {
   const std::vector<BodyState>& bodies() const override { return bodies_; }
   Diagnostics diagnostics() const override { return diagnostics_; }
   const std::vector<ContactState>& contacts() const override {
-    if (!contacts_known_) find_contact_states();
-    return contacts_;
+    if (!contacts_) contacts_ = contact_states();
+    return *contacts_;
   }
   Forces forces() const override {
     driver_->state_with_forces();
@@ -105,11 +105,16 @@ class EventEngine : public ResumableEngine {
     if (scribe_)
       driver_->observe([this](const ContactRows& rows, const VectorXd& x, const VectorXd& rest,
                               const VectorXd& before, bool exact) {
-        put_impact(before, struck(rows, x), struck(rows, rest), exact);
+        const auto struck = [&](const VectorXd& impulses) {
+          return states_of(impulses.size() > 0 ? rows.contacts() : std::vector<int>(),
+                           units_.mass * units_.speed(),
+                           [&](std::size_t k) { return rows.of(static_cast<int>(k), impulses); });
+        };
+        put_impact(before, struck(x), struck(rest), exact);
       });
   }
-  ContactState touching(int contact, const Vector3d& on_first) const;
-  std::vector<ContactState> struck(const ContactRows& rows, const VectorXd& x) const;
+  std::vector<ContactState> states_of(const std::vector<int>& contacts, double unit,
+                                      const std::function<VectorXd(std::size_t)>& parts) const;
   void put_impact(const VectorXd& before, const std::vector<ContactState>& contacts,
                   const std::vector<ContactState>& rest, bool exact);
   std::vector<std::array<Vector3d, 2>> accelerations() const;
@@ -117,7 +122,7 @@ class EventEngine : public ResumableEngine {
   StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const;
   Forces forces_of_motion() const;
   void update_results();
-  void find_contact_states() const;
+  std::vector<ContactState> contact_states() const;
   void append_events();
   void exchange(binary::Archive& io, Driver::Memory& m, double& reached, VectorXd& now) const;
 
@@ -136,8 +141,7 @@ class EventEngine : public ResumableEngine {
   joints::Reactions reactions_;
   VectorXd now_;
   std::vector<BodyState> bodies_;
-  mutable std::vector<ContactState> contacts_;
-  mutable bool contacts_known_ = false;
+  mutable std::optional<std::vector<ContactState>> contacts_;  // once they are asked for
   std::vector<ContactEvent> events_;
   Diagnostics diagnostics_;
   std::optional<Scene> to_certify_;  // in SI; only with Scene::certificate
@@ -164,7 +168,7 @@ void EventEngine::update_results() {
       if (!body.fixed && scene_.gravity)
         d.potential_energy -= body.mass * scene_.gravity->dot(origin_);
   }
-  contacts_known_ = false;
+  contacts_.reset();
   for (const int i : driver_->motion().closed()) d.contacts += model_->is_pair(i);
   // A point behind a face that has a border is not always in the body.
   const std::vector<ContactMode>& modes = driver_->motion().modes();
@@ -184,45 +188,55 @@ void EventEngine::update_results() {
   append_events();
 }
 
-void EventEngine::find_contact_states() const {
-  contacts_.clear();
-  contacts_known_ = true;
-  event::Motion& motion = driver_->motion();
-  if (motion.closed().empty()) return;
-  driver_->state_with_forces();
-  const std::vector<VectorXd> forces = motion.contact_forces();
-  std::vector<int> holders;
-  for (std::size_t k = 0; k < forces.size(); ++k) {
-    const int contact = motion.closed()[k];
+// Pairs that touch, with the forces or impulses on their first bodies: those by normal and tangents
+// that each contact has, in this unit. Moments are those of the pairs that hold them.
+std::vector<ContactState> EventEngine::states_of(
+    const std::vector<int>& contacts, double unit,
+    const std::function<VectorXd(std::size_t)>& parts) const {
+  std::vector<ContactState> out;
+  std::vector<int> pairs;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const int contact = contacts[k];
+    if (model_->is_law(contact)) continue;
+    const Vector3d on_first = model_->in_space(contact, parts(k));
     if (model_->is_moment(contact)) {
-      const auto by = std::find(holders.begin(), holders.end(), model_->law(contact).held_by);
-      contacts_[at(static_cast<int>(by - holders.begin()))].moment +=
-          units_.force() * units_.length * model_->in_space(contact, forces[k]);
+      const auto by = std::find(pairs.begin(), pairs.end(), model_->law(contact).held_by);
+      out[at(static_cast<int>(by - pairs.begin()))].moment += unit * units_.length * on_first;
+      continue;
     }
-    if (!model_->is_pair(contact)) continue;
-    holders.push_back(contact);
-    ContactState c = touching(contact, units_.force() * model_->in_space(contact, forces[k]));
-    VectorXd slip(3);
-    slip << 0, motion.slip(static_cast<int>(k));
-    c.slip = units_.speed() * (model_->pair(contact).elliptic ? model_->slip_of(contact)
-                                                              : model_->in_space(contact, slip));
-    contacts_.push_back(c);
+    const FeaturePair& pair = model_->pair(contact);
+    const Touch touch = pair.touch(model_->bodies().all());
+    pairs.push_back(contact);
+    ContactState& c = out.emplace_back();
+    c.first = pair.first;
+    c.second = pair.second;
+    c.point = units_.length * touch.point;
+    to_world(c.point);
+    c.normal = touch.normal;
+    c.gap = units_.length * touch.gap;
+    c.force = unit * on_first;
   }
+  return out;
 }
 
-// Two bodies where they touch, with the force or impulse on the first one.
-ContactState EventEngine::touching(int contact, const Vector3d& on_first) const {
-  const FeaturePair& pair = model_->pair(contact);
-  const Touch touch = pair.touch(model_->bodies().all());
-  ContactState c;
-  c.first = pair.first;
-  c.second = pair.second;
-  c.point = units_.length * touch.point;
-  to_world(c.point);
-  c.normal = touch.normal;
-  c.gap = units_.length * touch.gap;
-  c.force = on_first;
-  return c;
+std::vector<ContactState> EventEngine::contact_states() const {
+  event::Motion& motion = driver_->motion();
+  const std::vector<int>& closed = motion.closed();
+  if (closed.empty()) return {};
+  driver_->state_with_forces();
+  const std::vector<VectorXd> forces = motion.contact_forces();
+  std::vector<ContactState> out =
+      states_of(closed, units_.force(), [&](std::size_t k) { return forces[k]; });
+  auto state = out.begin();
+  for (std::size_t k = 0; k < closed.size(); ++k) {
+    if (!model_->is_pair(closed[k])) continue;
+    VectorXd slip(3);
+    slip << 0, motion.slip(static_cast<int>(k));
+    state++->slip =
+        units_.speed() * (model_->pair(closed[k]).elliptic ? model_->slip_of(closed[k])
+                                                           : model_->in_space(closed[k], slip));
+  }
+  return out;
 }
 
 // The model has the state after it.
@@ -242,28 +256,6 @@ void EventEngine::put_impact(const VectorXd& before, const std::vector<ContactSt
     }
   }
   scribe_->put_impact(units_.time * bodies.all().time, came, after, contacts, rest, exact);
-}
-
-// Contacts with impulses in the place of forces; without impulses by row: none.
-std::vector<ContactState> EventEngine::struck(const ContactRows& rows, const VectorXd& x) const {
-  const double impulse = units_.mass * units_.speed();
-  std::vector<ContactState> contacts;
-  std::vector<int> holders;
-  for (std::size_t k = 0; k < rows.contacts().size() && x.size() > 0; ++k) {
-    const int contact = rows.contacts()[k];
-    const Vector3d on_first = model_->is_law(contact)
-                                  ? Vector3d(Vector3d::Zero())
-                                  : model_->in_space(contact, rows.of(static_cast<int>(k), x));
-    if (model_->is_moment(contact)) {
-      const auto by = std::find(holders.begin(), holders.end(), model_->law(contact).held_by);
-      contacts[at(static_cast<int>(by - holders.begin()))].moment +=
-          impulse * units_.length * on_first;
-    }
-    if (!model_->is_pair(contact)) continue;
-    holders.push_back(contact);
-    contacts.push_back(touching(contact, impulse * on_first));
-  }
-  return contacts;
 }
 
 std::vector<std::array<Vector3d, 2>> EventEngine::accelerations() const {

@@ -27,25 +27,7 @@ using linalg::at;
 constexpr int kMostRounds = 2000;    // of one instant
 constexpr double kUnknownGap = 0.1;  // of its band
 
-constexpr double kImplied = 1e-9;         // of A_nn
 constexpr double kLeastApproach = 1e-12;  // of the slip
-
-/// Whether the gap of contact k stays where those of the contacts with a force stay: which of them
-/// has none is the solver's choice, and no reason to leave it open.
-bool rests_on_others(const ContactRows& rows, const FrictionSolution& answer, int k) {
-  const int row = rows.parts()[at(k)].first;
-  std::vector<int> others;
-  for (std::size_t i = 0; i < answer.regimes.size(); ++i)
-    if (const ConePart& p = rows.parts()[i];
-        p.has_normal() && p.first != row && answer.regimes[i] != contact::Regime::separating)
-      others.push_back(p.first);
-  if (others.empty()) return false;
-  const SomeRows part(rows.A(), rows.A().col(row), others);
-  linalg::LeastSquares factor(kDependent);
-  factor.factor(part.A);
-  const double own = rows.A()(row, row);
-  return own - part.b.dot(VectorXd(factor.solve(part.b))) <= kImplied * own;
-}
 
 }  // namespace
 
@@ -91,14 +73,11 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed, Vect
     for (int row = p.first; row < end; ++row)
       if (std::abs(w[row]) <= speed) slow.push_back(row);
   }
-  const int n = static_cast<int>(slow.size());
-  if (n == 0) return 0;
-  const SomeRows part(rows.A(), -w, slow);
+  if (slow.empty()) return 0;
   linalg::LeastSquares factor;
-  factor.factor(part.A);
-  const VectorXd forces = factor.solve(part.b);
+  factor.factor(rows.A()(slow, slow));
   x.setZero(w.size());
-  for (int i = 0; i < n; ++i) x[slow[at(i)]] = forces[i];
+  x(slow) = factor.solve(-w(slow));
   return change_velocities(rows.change(x));
 }
 
@@ -107,6 +86,7 @@ double Driver::come_to_rest(const std::vector<int>& touching, double speed, Vect
 std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
   std::vector<int> out;
   bool any = false;
+  const bool together = options_.simultaneous == contact::SimultaneousImpacts::together;
   for (const int i : near) {
     if (!model_.law(i).has_normal()) continue;  // bounded: no impulse
     double rate = 0;
@@ -118,7 +98,7 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     const bool now = i == first || !open || gap <= std::max(-rate * options_.tolerance, unknown);
     const bool passes = open && i != first && motion_.passes_border(event_time_, y_, i);
     const bool hits = rate < -band && now && !passes;
-    const bool rests = std::abs(rate) <= band && !passes && !options_.in_turn;
+    const bool rests = std::abs(rate) <= band && !passes && together;
     if (hits || rests) out.push_back(i);
     any = any || hits;
   }
@@ -132,7 +112,7 @@ void Driver::collide(const std::vector<int>& near, EventKind otherwise, int cont
   for (int round = 0; round <= kMostRounds; ++round) {
     const std::vector<int> set = struck(near, round == 0 ? contact : -1);
     if (set.empty()) {
-      if (round == 0 && contact >= 0) record(otherwise, contact, 0, 0, 0);
+      if (round == 0 && contact >= 0) record(otherwise, contact);
       return;
     }
     if (round < kMostRounds)
@@ -233,7 +213,8 @@ void Driver::record_impacts(const ContactRows& rows, const Impact& impact, const
 
 // By Coulomb's law for accelerations (method, section 6), see solve_accelerations.
 
-std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const Left& left) {
+std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const Left& left,
+                                        bool may_jam) {
   std::vector<ContactMode> modes(at(model_.contacts()));
   model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
   const std::vector<int> candidates = staying(touching, left);
@@ -249,14 +230,12 @@ std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const 
       solve_accelerations(rows, slides, bands().of_accelerations(), closed);
   if (!answer.contacts.solved) fail("the forces of closed contacts are not solved");
   const int n = static_cast<int>(candidates.size());
-  for (int k = 0; k < n && !jammed_; ++k)
+  for (int k = 0; k < n && may_jam; ++k)
     if (slides[at(k)].size() > 0 && answer.contacts.regimes[at(k)] == contact::Regime::sticking &&
         rows.parts()[at(k)].slip_of(velocities).norm() > bands().slip(candidates[at(k)])) {
       jam(rows, velocities);
-      jammed_ = true;
-      return decide(this->touching(-1), {});
+      return decide(this->touching(-1), {}, false);
     }
-  jammed_ = false;
   for (int k = 0; k < n; ++k) {
     const int i = candidates[at(k)], by = model_.law(i).held_by;
     if (by >= 0 ? modes[at(by)].mode == Mode::open : lifts(rows, k, answer)) continue;
@@ -310,10 +289,7 @@ bool Driver::lifts(const ContactRows& rows, int k, const AccelerationSolution& a
   const ConePart& p = rows.parts()[at(k)];
   if (!p.has_normal()) return false;
   const FrictionSolution& forces = answer.contacts;
-  if (forces.regimes[at(k)] == contact::Regime::separating &&
-      !(std::abs(forces.w[p.first]) <= kNoChange * answer.scale &&
-        rests_on_others(rows, forces, k)))
-    return true;
+  if (forces.regimes[at(k)] == contact::Regime::separating) return true;
   bool lifted = false;
   for (int j = 0; j < model_.contacts() && !lifted; ++j)
     lifted = lifted_[at(j)] && are_one(rows.contacts()[at(k)], j);

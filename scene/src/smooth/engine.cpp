@@ -51,7 +51,7 @@ class SmoothEngine : public Engine {
       // Invariants keep the values of the start once it is consistent.
       system_->keep_invariants_of(start_time_, y_);
       for (int pass = 0; pass < 2; ++pass) {
-        Integrator start(*system_, with, start_time_, y_, yp_, Integrator::For::start);
+        Integrator start(*system_, with, start_time_, y_, yp_);
         const ida_projection::ConsistencyReport report = start.make_consistent(start_time_);
         if (report.status == ida_projection::Status::not_converged &&
             report.drift_before <= kRounding * std::max(1.0, y_.lpNorm<Eigen::Infinity>()))

@@ -12,20 +12,20 @@ void System::sum_forces(Stopwatch* watch) {
   }
 }
 
-void System::add_multipliers(const double* lambda, std::vector<Load6>& loads) const {
+void System::add_multipliers(const double* lambda) {
   const Bodies& bodies = bodies_.all();
   rows_.each([&](const auto& row) {
     const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
     Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
     row.pull(A, B, lambda + row.row, a, b);
-    put_wrench(bodies, row.first, a, loads);
-    put_wrench(bodies, row.second, b, loads);
+    put_wrench(bodies, row.first, a, loads_);
+    put_wrench(bodies, row.second, b, loads_);
   });
 }
 
-void System::torques_to_body_axes(std::vector<Load6>& loads) const {
+void System::torques_to_body_axes() {
   for (int k = 0; k < moving(); ++k) {
-    Load6& load = loads[at(k)];
+    Load6& load = loads_[at(k)];
     load.torque_body += bodies_.frame(k).R.transpose() * load.torque_world;
   }
 }
@@ -43,12 +43,6 @@ double System::power(const double* lambda) const {
   return sum;
 }
 
-// In the place of a row that depends on others: its multiplier is 0.
-void System::pin_multipliers(const double* multipliers, double* rows) const {
-  for (int i = 0; i < rows_.count(); ++i)
-    if (!in_use_.carries_multiplier(i)) rows[i] = dynamics_.size_of_row()[i] * multipliers[i];
-}
-
 // x' - v, q' - q (0, w) / 2 and M (v', w') - f of every body.
 void System::add_motion_residual(const double* y, const double* yp, double* r) const {
   using Map3 = Eigen::Map<const Vector3d>;
@@ -57,14 +51,10 @@ void System::add_motion_residual(const double* y, const double* yp, double* r) c
     const Inertia& inertia = bodies_.inertia(k);
     const double *s = y + kBody * k, *p = yp + kBody * k;
     double* out = r + kBody * k;
-    Vector3d v = Map3(s + kVelocity), w = Map3(s + kSpin);
-    if (form_ == Formulation::stabilised_index2) {
-      v += pulls_[at(k)].force / inertia.mass;
-      w += inertia.inverse * pulls_[at(k)].torque_body;
-    }
-    Eigen::Map<Vector3d>(out + kPosition) = Map3(p + kPosition) - v;
+    Eigen::Map<Vector3d>(out + kPosition) = Map3(p + kPosition) - Map3(s + kVelocity);
     Eigen::Map<Eigen::Vector4d>(out + kQuaternion) =
-        Eigen::Map<const Eigen::Vector4d>(p + kQuaternion) - quaternion_rate(s + kQuaternion, w);
+        Eigen::Map<const Eigen::Vector4d>(p + kQuaternion) -
+        quaternion_rate(s + kQuaternion, Map3(s + kSpin));
     if (form_ == Formulation::index0) {
       Eigen::Map<Eigen::Matrix<double, 6, 1>>(out + kVelocity) =
           Map6(p + kVelocity) - dynamics_.accelerations().segment<6>(6 * k);
@@ -78,17 +68,13 @@ void System::add_motion_residual(const double* y, const double* yp, double* r) c
 }
 
 void System::add_row_residual(const double* y, const double* yp, double* r) {
+  const double* lambda = y + first_multiplier();
   double* out = r + first_multiplier();
-  if (form_ == Formulation::stabilised_index2) {
-    double* positions = r + first_eta();
-    rows_.values<1>(bodies_.all(), out);
-    rows_.values<0>(bodies_.all(), positions);
-    pin_multipliers(y + first_eta(), positions);
-  } else {
-    bodies_.set_accelerations(yp);
-    rows_.values<2>(bodies_.all(), out);
-  }
-  pin_multipliers(y + first_multiplier(), out);
+  bodies_.set_accelerations(yp);
+  rows_.values<2>(bodies_.all(), out);
+  // In the place of a row that depends on others: its multiplier is 0.
+  for (int i = 0; i < rows(); ++i)
+    if (!in_use_.carries_multiplier(i)) out[i] = dynamics_.size_of_row()[i] * lambda[i];
 }
 
 void System::residual(double t, const double* y, const double* yp, double* r, Stopwatch* watch) {
@@ -101,20 +87,14 @@ void System::residual(double t, const double* y, const double* yp, double* r, St
 
   const bool index0 = form_ == Formulation::index0;
   if (index0) {
-    torques_to_body_axes(loads_);
+    torques_to_body_axes();
     if (watch) watch->lap(bodies);
     dynamics_.solve(loads_);
     lambda = dynamics_.multipliers().data();
     if (watch) watch->lap(joints);
   } else {
-    if (rows() > 0) add_multipliers(lambda, loads_);
-    torques_to_body_axes(loads_);
-    if (form_ == Formulation::stabilised_index2) {
-      for (Load6& pull : pulls_)
-        pull.force = pull.torque_body = pull.torque_world = Vector3d::Zero();
-      add_multipliers(y + first_eta(), pulls_);
-      torques_to_body_axes(pulls_);
-    }
+    if (rows() > 0) add_multipliers(lambda);
+    torques_to_body_axes();
     if (watch) watch->lap(joints);
   }
   add_motion_residual(y, yp, r);
@@ -144,29 +124,6 @@ void add_kinematic_jacobian(JacobianBlocks& J, int first, double cj, const doubl
 
 }  // namespace
 
-// eta moves x and q; its own size is that of the drift, so that d(G^T)/dq eta is left out.
-void System::add_eta_jacobian(JacobianBlocks& J, const double* y) const {
-  const Bodies& bodies = bodies_.all();
-  rows_.each([&](const auto& row) {
-    JointRows::each_unit_load(
-        row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
-          const Inertia& inertia = bodies.inertia[at(body)];
-          const int first = kBody * inertia.slot;
-          const Vector3d spin = inertia.inverse * torque;
-          const Eigen::Vector4d turn = quaternion_rate(y + first + kQuaternion, spin);
-          for (int k = 0; k < 3; ++k)
-            J.add(first + k, first_eta() + row.row + i, -force[k] / inertia.mass);
-          for (int k = 0; k < 4; ++k)
-            J.add(first + kQuaternion + k, first_eta() + row.row + i, -turn[k]);
-        });
-  });
-}
-
-void System::pin_jacobian(JacobianBlocks& J, int first) const {
-  for (int i = 0; i < rows(); ++i)
-    J.add(first + i, first + i, in_use_.carries_multiplier(i) ? 0.0 : dynamics_.size_of_row()[i]);
-}
-
 void System::jacobian(double t, double cj, const double* y, const double* yp, Entries& entries) {
   update(t, y);
   bodies_.set_turns(y);
@@ -175,14 +132,11 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
     return;
   }
   bodies_.set_accelerations(yp);
-  const bool index2 = form_ == Formulation::stabilised_index2;
   JacobianBlocks J(entries, bodies_.all().turns, kBody, kVelocity, first_work());
   for (int k = 0; k < moving(); ++k) {
     const Inertia& inertia = bodies_.inertia(k);
     const int first = kBody * k;
-    Vector3d w = bodies_.spin(k);
-    if (index2) w += inertia.inverse * pulls_[at(k)].torque_body;
-    add_kinematic_jacobian(J, first, cj, y + first + kQuaternion, w);
+    add_kinematic_jacobian(J, first, cj, y + first + kQuaternion, bodies_.spin(k));
     for (int i = 0; i < 3; ++i)
       J.add(first + kVelocity + i, first + kVelocity + i, cj * inertia.mass);
     J.add_block(first + kSpin, first + kSpin, cj * inertia.inertia);
@@ -199,20 +153,15 @@ void System::jacobian(double t, double cj, const double* y, const double* yp, En
           J.add(first_work(), first_multiplier() + row.row + i, g_t[i]);
       });
   }
-  pin_jacobian(J, first_multiplier());
-  if (!index2) {
-    terms_.add_rows<2>(J, first_multiplier(), &in_use_, true, cj);
-    return;
-  }
-  terms_.add_rows<1>(J, first_multiplier(), &in_use_, false, 0.0);
-  terms_.add_rows<0>(J, first_eta(), &in_use_, false, 0.0);
-  pin_jacobian(J, first_eta());
-  add_eta_jacobian(J, y);
+  for (int i = 0; i < rows(); ++i)
+    J.add(first_multiplier() + i, first_multiplier() + i,
+          in_use_.carries_multiplier(i) ? 0.0 : dynamics_.size_of_row()[i]);
+  terms_.add_rows(J, first_multiplier(), &in_use_, cj);
 }
 
 void System::index0_jacobian(double cj, const double* y, Entries& entries) {
   sum_forces(nullptr);
-  torques_to_body_axes(loads_);
+  torques_to_body_axes();
   dynamics_.solve(loads_);
   dynamics_.set_accelerations();
   acceleration_jacobian_->form();

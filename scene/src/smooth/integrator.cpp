@@ -4,30 +4,23 @@
 #include "bounds.hpp"
 #include "mechanics/roots.hpp"
 
-#include <sunlinsol/sunlinsol_spgmr.h>
-
 namespace tether::scene::smooth {
 
 namespace {
 
 // IDA bounds the error of each step; a run's error grows with the number of steps, which is about
 // tolerance^(-1/6). With this, and a tenth of the wanted error at 1e-4, slider-crank and four-bar
-// stay below ten times the tolerance after 10 s. The stabilised form needs smaller steps.
+// stay below ten times the tolerance after 10 s.
 double local_tolerance(const SmoothOptions& options) {
-  const bool index2 = options.formulation == Formulation::stabilised_index2;
-  const double wanted = (index2 ? 0.02 : 0.1) * options.tolerance;
+  const double wanted = 0.1 * options.tolerance;
   const double tighter = std::min(1.0, std::pow(options.tolerance / 1e-4, 1.0 / 6.0));
-  // Below this rounding decides, not the number of steps.
-  const double rounding = index2 ? 3e-12 : 1e-11, smallest = index2 ? 3e-12 : 1e-13;
-  return std::max({tighter * wanted, std::min(wanted, rounding), smallest});
+  // Below the first rounding decides, not the number of steps.
+  constexpr double kRounding = 1e-11, kSmallest = 1e-13;
+  return std::max({tighter * wanted, std::min(wanted, kRounding), kSmallest});
 }
 
-// The multipliers of index 2 magnify what Newton's test leaves.
-constexpr double kNewtonIndex2 = 0.02;
-constexpr double kNewtonRounding = 2e-13;  // no less of it
-
-// Noise of velocities across the joints, times pivot^2; see weights().
-constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3, kSmallestPivotIndex2 = 1e-3;
+// Noise of velocities across the joints, times pivot^2; see widening().
+constexpr double kNoise = 3e-14, kSmallestPivot = 3e-3;
 
 // An anchor is not close to a singular position, where y' and the multipliers are badly known.
 constexpr double kAnchorPivot = 0.01;
@@ -39,38 +32,26 @@ double now() {
 }  // namespace
 
 Integrator::Integrator(System& system, const SmoothOptions& options, double t,
-                       const Eigen::VectorXd& y, const Eigen::VectorXd& yp, For purpose)
-    : system_(system),
+                       const Eigen::VectorXd& y, const Eigen::VectorXd& yp)
+    : IdaEquations(local_tolerance(options), system.absolute_tolerances(local_tolerance(options))),
+      system_(system),
       options_(options),
       t_(t),
-      tolerance_(local_tolerance(options)),
-      absolute_(system.size()),
       spent_(system.effect_names().size()) {
-  Eigen::VectorXd id(system.size());
-  for (int i = 0; i < system.size(); ++i) {
-    id[i] = system.id(i);
-    absolute_[i] = system.absolute_tolerance(i, tolerance_);
-  }
-  session_.emplace(context_, IdaSession::Start{t, y, yp, id}, residual, weights, this,
-                   options.max_step);
-  system.choose_rows(t, y.data(), tolerance_);
-  // id is 1 where a component has a rate.
-  const FirstStep first{tolerance_, kInfinity, id,
-                        [&](double at, Eigen::VectorXd& ahead, Eigen::VectorXd& rate) {
-                          system_.complete(at, ahead, rate);
-                        }};
-  session_->set_first_step(first(t, y, yp));
-  if (purpose == For::motion) {
-    matrix_.emplace(system, t, session_->y(), session_->yp(), context_);
-    session_->use(matrix_->solver(), matrix_->matrix(), jacobian);
-  } else {  // IDA wants a solver to begin with; this one has no matrix
-    unused_.reset(SUNLinSol_SPGMR(session_->y(), SUN_PREC_NONE, 1, context_));
-    session_->use(unused_.get(), nullptr, nullptr);
-  }
+  const Eigen::VectorXd id = system.id();
+  const IdaSession::Start start{t, y, yp, id};
+  session_.emplace(context_, start, *this, options.max_step);
+  system.choose_rows(t, y.data(), tolerance());
+  session_->set_first_step(
+      first_step(tolerance(), kInfinity, id, start,
+                 [&](double at, Eigen::VectorXd& ahead, Eigen::VectorXd& rate) {
+                   system_.complete(at, ahead, rate);
+                 }));
+  matrix_.emplace(system, t, session_->y(), session_->yp(), context_);
+  session_->use(matrix_->solver(), matrix_->matrix());
   // Multipliers are derived quantities in every form: IDA judges the motion.
   session_->check(IDASetSuppressAlg(session_->ida(), 1), "IDASetSuppressAlg");
-  const bool index2 = options.formulation == Formulation::stabilised_index2;
-  session_->set_newton(index2 ? std::max(kNewtonIndex2, kNewtonRounding / tolerance_) : kNewton);
+  session_->set_newton(kNewton);
   if (options.projection) {
     ida_projection::Options projection;
     // Close to singular positions F responds to any move, without being stiff: no other metric is
@@ -79,9 +60,7 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
     // Errors then follow the tolerance; by IDA's own rule one tolerance in ten ends twenty times
     // worse than its neighbours where singular positions magnify errors.
     projection.step_smoothing = true;
-    // Without its refresh the noise of index 1's multipliers grows until Newton fails. Those of
-    // index 2 scale with cj, as IDA's own factor does: the refresh with stale factors makes errors
-    // at tight tolerances up to thirty times larger.
+    // Without its refresh the noise of index 1's multipliers grows until Newton fails.
     projection.advanced.polish = options.formulation == Formulation::index1
                                      ? ida_projection::Polished::all
                                      : ida_projection::Polished::differential;
@@ -93,42 +72,24 @@ Integrator::Integrator(System& system, const SmoothOptions& options, double t,
   }
 }
 
-int Integrator::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
-  Integrator& me = *static_cast<Integrator*>(self);
+void Integrator::residual(double t, const double* y, const double* yp, double* r) {
   // Reading clocks costs as much as a small effect, so few evaluations are timed.
-  const bool timed = (me.spent_.residuals++ & 31) == 0;
-  me.spent_.timed += timed;
-  me.system_.residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), N_VGetArrayPointer(r),
-                      timed ? &me.spent_.effects : nullptr);
-  const double* out = N_VGetArrayPointer(r);
-  double sum = 0;
-  for (int i = 0; i < me.system_.size(); ++i) sum += out[i];
-  return std::isfinite(sum) ? 0 : 1;  // IDA tries a smaller step
+  const bool timed = (spent_.residuals++ & 31) == 0;
+  spent_.timed += timed;
+  system_.residual(t, y, yp, r, timed ? &spent_.effects : nullptr);
 }
 
-// 1 / (rtol |y| + atol). Near a singular position velocities across the joints are known to
-// round-off / pivot^2 only, and no step size makes them better: what cannot be had is not asked
-// for.
-int Integrator::weights(N_Vector y, N_Vector weights, void* self) {
-  const Integrator& me = *static_cast<Integrator*>(self);
-  const bool index2 = me.options_.formulation == Formulation::stabilised_index2;
-  const double smallest = index2 ? kSmallestPivotIndex2 : kSmallestPivot;
-  const double pivot = std::max(me.system_.weakest_pivot(), smallest);
-  const double widen = std::max(1.0, kNoise / (pivot * pivot * me.tolerance_));
-  const double *values = N_VGetArrayPointer(y), *atol = me.absolute_.data();
-  double* out = N_VGetArrayPointer(weights);
-  for (int i = 0; i < me.system_.size(); ++i)
-    out[i] = 1.0 / (widen * (me.tolerance_ * std::abs(values[i]) + atol[i]));
-  return 0;
+// Near a singular position velocities across the joints are known to round-off / pivot^2 only, and
+// no step size makes them better: what cannot be had is not asked for.
+double Integrator::widening() const {
+  const double pivot = std::max(system_.weakest_pivot(), kSmallestPivot);
+  return std::max(1.0, kNoise / (pivot * pivot * tolerance()));
 }
 
-int Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J,
-                         void* self, N_Vector, N_Vector, N_Vector) {
-  Integrator& me = *static_cast<Integrator*>(self);
+void Integrator::jacobian(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) {
   const double begin = now();
-  me.matrix_->fill(t, cj, y, yp, J);
-  me.spent_.jacobian += now() - begin;
-  return 0;
+  matrix_->fill(t, cj, y, yp, J);
+  spent_.jacobian += now() - begin;
 }
 
 ida_projection::ConsistencyReport Integrator::make_consistent(double t) {
@@ -150,7 +111,7 @@ int Integrator::step_past(double t, long& steps_left, const std::function<bool()
     const double begin = step_end();
     const double kink = system_.next_kink(step_end());
     if (std::isfinite(kink))  // no step passes over one
-      session_->check(IDASetStopTime(session_->ida(), kink), "IDASetStopTime");
+      session_->set_stop(kink);
     const int flag = session_->solve(t, t_, IDA_ONE_STEP);
     if (flag < 0) return flag;
     steps_left -= steps() - before;

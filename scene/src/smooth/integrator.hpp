@@ -10,14 +10,11 @@ namespace tether::scene::smooth {
 
 /// One run of IDA from a point on. Its steps depend on that point alone, never on the times
 /// that it is asked for: they are interpolated.
-class Integrator {
+class Integrator : public IdaEquations {
  public:
-  /// Purpose of an integrator: without a matrix it can only make a start consistent.
-  enum class For { motion, start };
-
   /// `y` and `yp` are consistent up to errors that `make_consistent` repairs.
   Integrator(System& system, const SmoothOptions& options, double t, const Eigen::VectorXd& y,
-             const Eigen::VectorXd& yp, For purpose = For::motion);
+             const Eigen::VectorXd& yp);
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;
 
@@ -47,10 +44,9 @@ class Integrator {
   Seconds seconds() const;
 
  private:
-  static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
-  static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
-                      void* self, N_Vector, N_Vector, N_Vector);
-  static int weights(N_Vector y, N_Vector weights, void* self);
+  void residual(double t, const double* y, const double* yp, double* r) override;
+  void jacobian(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) override;
+  double widening() const override;
   int step_past(double t, long& steps_left, const std::function<bool()>& interrupted);
   std::string failure(int flag) const;
 
@@ -66,11 +62,8 @@ class Integrator {
   double t_;
   OfState excess_;
   double above_from_ = kInfinity;
-  double tolerance_;  // of a step
-  Eigen::VectorXd absolute_;
   QuietContext context_;
   std::optional<NewtonMatrix> matrix_;
-  OwnedLinearSolver unused_;  // in place of its solver
   std::optional<IdaSession> session_;
   Spent spent_;
 };

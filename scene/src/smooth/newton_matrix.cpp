@@ -1,7 +1,6 @@
 // Tether: IDA's matrix of a smooth system and its solver. SPDX-License-Identifier: BSD-3-Clause
 #include "newton_matrix.hpp"
 
-#include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <Eigen/OrderingMethods>
@@ -134,9 +133,7 @@ void NewtonMatrix::make_dense(N_Vector y, SUNContext context) {
   std::vector<int> slots(places.size());
   for (std::size_t k = 0; k < places.size(); ++k) slots[k] = places[k].first + N * places[k].second;
   matrix_.reset(SUNDenseMatrix(N, N, context));
-  solver_.reset(N <= ida_projection::kLargestFastDense
-                    ? ida_projection::fast_dense_solver(y, matrix())
-                    : SUNLinSol_Dense(y, matrix(), context));
+  solver_ = dense_solver(y, matrix(), context);
   entries_.finish(std::move(slots));
 }
 

@@ -19,18 +19,24 @@ System::System(const Scene& scene, const Units& units)
   kinks_ = effects::kinks_of(scene);
   size_ = first_multiplier();
   if (form_ == Formulation::index1) size_ += rows();
-  if (form_ == Formulation::stabilised_index2) size_ += 2 * rows();
   loads_.resize(at(moving()));
-  pulls_.resize(at(moving()));
   joint_values_.setZero(2 * rows());
   if (form_ == Formulation::index0)
     acceleration_jacobian_ = std::make_unique<AccelerationJacobian>(terms_, dynamics_);
 }
 
-double System::absolute_tolerance(int i, double tolerance) const {
-  // Multipliers follow the state; where rows depend on each other they are known to round-off / eps
-  // only, and at a singular position they have a pole. Newton's test is left to the state.
-  return i < first_multiplier() ? tolerance : 1e10 * tolerance;
+Eigen::VectorXd System::id() const {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(size_);
+  out.head(first_multiplier()).setOnes();
+  return out;
+}
+
+// Multipliers follow the state; where rows depend on each other they are known to round-off / eps
+// only, and at a singular position they have a pole. Newton's test is left to the state.
+Eigen::VectorXd System::absolute_tolerances(double tolerance) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Constant(size_, 1e10 * tolerance);
+  out.head(first_multiplier()).setConstant(tolerance);
+  return out;
 }
 
 Eigen::VectorXd System::start_state() const {
@@ -74,7 +80,7 @@ void System::keep_invariants_of(double t, const Eigen::VectorXd& y) {
 void System::complete(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp) {
   update(t, y.data());
   sum_forces(nullptr);
-  torques_to_body_axes(loads_);
+  torques_to_body_axes();
   dynamics_.solve(loads_);
   yp.setZero(size_);
   for (int k = 0; k < moving(); ++k) {
@@ -89,7 +95,6 @@ void System::complete(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp) {
   const Eigen::VectorXd& lambda = dynamics_.multipliers();
   if (invariants_.has_work()) yp[first_work()] = power(lambda.data());
   if (form_ != Formulation::index0) y.segment(first_multiplier(), rows()) = lambda;
-  if (form_ == Formulation::stabilised_index2) y.segment(first_eta(), rows()).setZero();
 }
 
 std::vector<std::string> System::effect_names() const {
@@ -114,7 +119,7 @@ Diagnostics System::diagnostics(double t, const double* y) {
 scene::Forces System::forces(double t, const double* y, const joints::Reactions& reactions) {
   update(t, y);
   sum_forces(nullptr);
-  torques_to_body_axes(loads_);
+  torques_to_body_axes();
   dynamics_.solve(loads_);
   scene::Forces out;
   out.joints = reactions.find(rows_, bodies_.all(), dynamics_.multipliers().data());

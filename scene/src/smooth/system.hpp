@@ -1,19 +1,17 @@
 // Tether: the equations of motion of a smooth scene. SPDX-License-Identifier: BSD-3-Clause
 //
 // Unknowns: for each moving body x, q (wxyz, body to world), v, w (body axes); then the work of
-// forces without potential if energy is kept with them; then the multipliers lambda and, in the
-// stabilised form, eta.
+// forces without potential if energy is kept with them; then the multipliers lambda.
 //
 //   index 1        x' = v, q' = q (0, w) / 2, M (v', w') = f + G^T lambda, g'' = 0
 //   index 0        the same with lambda eliminated: G M^-1 G^T lambda = -(gamma + G M^-1 f)
-//   stabilised 2   x', q' with (v, w) + M^-1 G^T eta, G v + g_t = 0, g = 0
 //
 // Rows may depend on each other, everywhere (planar linkages of 3-D hinges, Bricard's) or at a dead
-// point. So index 1 and 2 give multipliers to as many rows as are independent along the motion, and
-// hold the others at 0; see rows_in_use.cpp. A diagonal term eps lambda in their place acts through
-// eps / pivot^2: at tight tolerances it bends the motion at a singular position, and IDA does not
-// get through. Index 0 has it (eps = 1e-11 of the diagonal, refined three times, so to the third
-// power).
+// point. So index 1 gives multipliers to as many rows as are independent along the motion, and
+// holds the others at 0; see rows_in_use.cpp. A diagonal term eps lambda in their place acts
+// through eps / pivot^2: at tight tolerances it bends the motion at a singular position, and IDA
+// does not get through. Index 0 has it (eps = 1e-11 of the diagonal, refined three times, so to the
+// third power).
 #pragma once
 
 #include <chrono>
@@ -55,9 +53,9 @@ class System {
   int size() const { return size_; }
   int rows() const { return rows_.count(); }
   int moving() const { return bodies_.count(); }
-  /// 1 differential, 0 algebraic.
-  double id(int i) const { return i < first_multiplier() ? 1.0 : 0.0; }
-  double absolute_tolerance(int i, double tolerance) const;
+  /// 1 where a component has a rate, 0 where it is algebraic.
+  Eigen::VectorXd id() const;
+  Eigen::VectorXd absolute_tolerances(double tolerance) const;
 
   /// y and y' at t = 0 from the scene.
   Eigen::VectorXd start_state() const;
@@ -103,7 +101,6 @@ class System {
  private:
   int first_work() const { return kBody * moving(); }
   int first_multiplier() const { return first_work() + (invariants_.has_work() ? 1 : 0); }
-  int first_eta() const { return first_multiplier() + rows(); }
 
   int first_invariant() const { return 2 * in_use_.count() + moving(); }  // of the constraints
   void row_values(double t, const double* y, double* g);
@@ -113,14 +110,11 @@ class System {
   ida_projection::Constraints dense_constraints(), sparse_constraints();
 
   void update(double t, const double* y);  // frames, without accelerations
-  void add_multipliers(const double* lambda, std::vector<Load6>& loads) const;
+  void add_multipliers(const double* lambda);
   void sum_forces(Stopwatch* watch);
-  void torques_to_body_axes(std::vector<Load6>& loads) const;
+  void torques_to_body_axes();
   void add_motion_residual(const double* y, const double* yp, double* r) const;
   void add_row_residual(const double* y, const double* yp, double* r);
-  void add_eta_jacobian(JacobianBlocks& J, const double* y) const;
-  void pin_multipliers(const double* multipliers, double* rows) const;
-  void pin_jacobian(JacobianBlocks& J, int first) const;
   void index0_jacobian(double cj, const double* y, Entries& entries);
   double power(const double* lambda) const;
   double drift(double t, const double* y);
@@ -137,8 +131,8 @@ class System {
   std::unique_ptr<AccelerationJacobian> acceleration_jacobian_;  // index 0
   std::vector<double> kinks_;                                    // of forces, by time
   int size_ = 0;
-  std::vector<Load6> loads_, pulls_;  // sums on each moving body: forces, and G^T eta
-  Eigen::VectorXd joint_values_;      // workspace
+  std::vector<Load6> loads_;      // sums of forces on each moving body
+  Eigen::VectorXd joint_values_;  // workspace
 };
 
 }  // namespace tether::scene::smooth

@@ -31,21 +31,20 @@ void JacobianTerms::add_motion(JacobianBlocks& J, const double* lambda, int firs
   });
 }
 
-template <int order>
 void JacobianTerms::add_rows(JacobianBlocks& J, int first_row, const RowsInUse* in_use,
-                             bool accelerations, double cj) const {
+                             double cj) const {
   const Bodies& all = bodies.all();
   rows.each([&](const auto& row) {
     const Inertia &ia = all.inertia[at(row.first)], &ib = all.inertia[at(row.second)];
     const Frame<Dual> A = seed(all.frames[at(row.first)], ia.slot >= 0, 0);
     const Frame<Dual> B = seed(all.frames[at(row.second)], ib.slot >= 0, kBodyDirections);
     Dual g[3], rate[3];
-    row.template rows<order>(A, B, g);
-    if (accelerations) row.template rows<1>(A, B, rate);
+    row.template rows<2>(A, B, g);
+    if (in_use) row.template rows<1>(A, B, rate);
     for (int i = 0; i < row.count; ++i) {
       Derivatives d = g[i].derivatives();
       // g'' depends on accelerations as g' does on velocities.
-      if (accelerations) {
+      if (in_use) {
         d.segment<6>(6) += cj * rate[i].derivatives().template segment<6>(6);
         d.segment<6>(18) += cj * rate[i].derivatives().template segment<6>(18);
       }
@@ -56,13 +55,6 @@ void JacobianTerms::add_rows(JacobianBlocks& J, int first_row, const RowsInUse* 
     }
   });
 }
-
-template void JacobianTerms::add_rows<0>(JacobianBlocks&, int, const RowsInUse*, bool,
-                                         double) const;
-template void JacobianTerms::add_rows<1>(JacobianBlocks&, int, const RowsInUse*, bool,
-                                         double) const;
-template void JacobianTerms::add_rows<2>(JacobianBlocks&, int, const RowsInUse*, bool,
-                                         double) const;
 
 void JacobianTerms::add_power(JacobianBlocks& J) const {
   for (const auto& force : forces)
@@ -82,15 +74,14 @@ void AccelerationJacobian::form_left() {
   const auto partials = [&] {
     JacobianBlocks D(entries_, terms_.bodies.all().turns, 6, 0, 0);
     terms_.add_motion(D, dynamics_.multipliers().data(), -1);
-    terms_.add_rows<2>(D, n, nullptr, false, 0.0);
+    terms_.add_rows(D, n, nullptr, 0.0);
   };
-  if (!recorded_) {
+  if (entries_.places.empty()) {
     entries_.record();
     partials();
     std::vector<int> slots;
     for (const auto& [row, column] : entries_.places) slots.push_back(row + pitch * column);
     entries_.finish(std::move(slots));
-    recorded_ = true;
   }
   left_.setZero();
   entries_.begin(left_.data());

@@ -92,11 +92,9 @@ struct JacobianTerms {
   /// Minus the derivatives of the forces and of G^T lambda to y and, from the column
   /// `first_lambda` on, to lambda (< 0: none).
   void add_motion(JacobianBlocks& J, const double* lambda, int first_lambda) const;
-  /// Derivatives of the order-th rate of g to y and, times cj, to the accelerations; rows without a
-  /// multiplier are 0 where `in_use` is given.
-  template <int order>
-  void add_rows(JacobianBlocks& J, int first_row, const RowsInUse* in_use, bool accelerations,
-                double cj) const;
+  /// Derivatives of g'' to y and, where `in_use` is given, times cj to the accelerations; rows
+  /// without a multiplier are 0 then.
+  void add_rows(JacobianBlocks& J, int first_row, const RowsInUse* in_use, double cj) const;
   /// Minus the derivatives of the power of all forces, by multipliers apart.
   void add_power(JacobianBlocks& J) const;
 };
@@ -119,7 +117,6 @@ class AccelerationJacobian {
   const ForwardDynamics& dynamics_;
   Eigen::MatrixXd left_, da_, dlambda_;
   Entries entries_;
-  bool recorded_ = false;
 };
 
 }  // namespace tether::scene::smooth

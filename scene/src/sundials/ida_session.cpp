@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <new>
+#include <sunlinsol/sunlinsol_dense.h>
 
 namespace tether::scene {
 
@@ -15,10 +16,34 @@ constexpr double kFirstMove = 1e-2;       // the part by which a component moves
 constexpr double kFirstAtRest = 1e-3;     // s
 constexpr double kDifferencePart = 1e-5;  // the part of a move over which y'' is differenced
 
+int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* equations) {
+  double* out = N_VGetArrayPointer(r);
+  static_cast<IdaEquations*>(equations)->residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp),
+                                                  out);
+  double sum = 0;
+  for (sunindextype i = 0; i < N_VGetLength(r); ++i) sum += out[i];
+  return std::isfinite(sum) ? 0 : 1;  // IDA tries a smaller step
+}
+
+int weights(N_Vector y, N_Vector weights, void* equations) {
+  const auto& of = *static_cast<const IdaEquations*>(equations);
+  const double widen = of.widening(), *values = N_VGetArrayPointer(y);
+  double* out = N_VGetArrayPointer(weights);
+  for (Eigen::Index i = 0; i < of.absolute().size(); ++i)
+    out[i] = 1.0 / (widen * (of.tolerance() * std::abs(values[i]) + of.absolute()[i]));
+  return 0;
+}
+
+int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J, void* equations,
+             N_Vector, N_Vector, N_Vector) {
+  static_cast<IdaEquations*>(equations)->jacobian(t, cj, y, yp, J);
+  return 0;
+}
+
 }  // namespace
 
-IdaSession::IdaSession(QuietContext& context, const Start& start, IDAResFn residual,
-                       IDAEwtFn weights, void* user, double max_step)
+IdaSession::IdaSession(QuietContext& context, const Start& start, IdaEquations& equations,
+                       double max_step)
     : context_(context), max_step_(max_step), ida_(IDACreate(context)) {
   if (ida_ == nullptr) throw std::bad_alloc();
   const auto N = start.y.size();
@@ -30,7 +55,7 @@ IdaSession::IdaSession(QuietContext& context, const Start& start, IDAResFn resid
   fill(y_, start.y), fill(yp_, start.yp), fill(id_, start.id);
   context.keep_messages_of(ida_);
   check(IDAInit(ida_, residual, start.t, y(), yp()), "IDAInit");
-  check(IDASetUserData(ida_, user), "IDASetUserData");
+  check(IDASetUserData(ida_, &equations), "IDASetUserData");
   check(IDAWFtolerances(ida_, weights), "IDAWFtolerances");
   check(IDASetMaxNumSteps(ida_, -1), "IDASetMaxNumSteps");
   check(IDASetId(ida_, id_.get()), "IDASetId");
@@ -46,9 +71,9 @@ void IdaSession::check(int flag, const char* call) const {
     throw std::runtime_error(std::string(call) + ": " + name(flag) + ". " + context_.message());
 }
 
-void IdaSession::use(SUNLinearSolver solver, SUNMatrix matrix, IDALsJacFn jacobian) {
+void IdaSession::use(SUNLinearSolver solver, SUNMatrix matrix) {
   check(IDASetLinearSolver(ida_, solver, matrix), "IDASetLinearSolver");
-  if (jacobian != nullptr) check(IDASetJacFn(ida_, jacobian), "IDASetJacFn");
+  if (matrix != nullptr) check(IDASetJacFn(ida_, jacobian), "IDASetJacFn");
 }
 
 void IdaSession::project(const ida_projection::Constraints& constraints,
@@ -95,14 +120,22 @@ Counts IdaSession::counts() const {
   return c;
 }
 
-double FirstStep::operator()(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const {
+OwnedLinearSolver dense_solver(N_Vector y, SUNMatrix matrix, SUNContext context) {
+  return OwnedLinearSolver(N_VGetLength(y) <= ida_projection::kLargestFastDense
+                               ? ida_projection::fast_dense_solver(y, matrix)
+                               : SUNLinSol_Dense(y, matrix, context));
+}
+
+double first_step(double tolerance, double longest, const Eigen::VectorXd& sizes,
+                  const IdaSession::Start& start, const IdaRate& rate) {
+  const Eigen::VectorXd &y = start.y, &yp = start.yp;
   double speed = 0;
   for (Eigen::Index i = 0; i < y.size(); ++i)
     if (sizes[i] != 0) speed = std::max(speed, std::abs(yp[i]) / (sizes[i] + std::abs(y[i])));
   if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
   const double span = kDifferencePart / speed;
   Eigen::VectorXd ahead = y + span * yp, there(y.size());
-  rate(t + span, ahead, there);
+  rate(start.t + span, ahead, there);
   double sum = 0;
   for (Eigen::Index i = 0; i < y.size(); ++i) {
     if (sizes[i] == 0) continue;

@@ -28,18 +28,38 @@ struct Released {
 using OwnedVector = std::unique_ptr<_generic_N_Vector, Released<N_VDestroy>>;
 using OwnedMatrix = std::unique_ptr<_generic_SUNMatrix, Released<SUNMatDestroy>>;
 using OwnedLinearSolver = std::unique_ptr<_generic_SUNLinearSolver, Released<SUNLinSolFree>>;
-using OwnedCorrector = std::unique_ptr<_generic_SUNNonlinearSolver, Released<SUNNonlinSolFree>>;
 
-/// One run of IDA from a point on. The solvers that it is given and the context outlive it.
+/// The equations of a session, F(t, y, y') = 0, and the errors that it allows.
+class IdaEquations {
+ public:
+  virtual void residual(double t, const double* y, const double* yp, double* r) = 0;
+  /// dF/dy + cj dF/dy' into J; not called without a matrix.
+  virtual void jacobian(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) = 0;
+  /// Errors of y_i up to this times (tolerance |y_i| + absolute_i) are allowed in a step.
+  virtual double widening() const { return 1; }
+  double tolerance() const { return tolerance_; }
+  const Eigen::VectorXd& absolute() const { return absolute_; }
+
+ protected:
+  IdaEquations(double tolerance, Eigen::VectorXd absolute)
+      : tolerance_(tolerance), absolute_(std::move(absolute)) {}
+  ~IdaEquations() = default;
+
+ private:
+  double tolerance_;
+  Eigen::VectorXd absolute_;
+};
+
+/// One run of IDA from a point on. The solvers that it is given, the context and the equations
+/// outlive it.
 class IdaSession {
  public:
   struct Start {
     double t;
     const Eigen::VectorXd &y, &yp, &id;
   };
-  /// `user`: what `residual` and `weights` are called with. Steps are counted by the caller.
-  IdaSession(QuietContext& context, const Start& start, IDAResFn residual, IDAEwtFn weights,
-             void* user, double max_step);
+  /// Steps are counted by the caller.
+  IdaSession(QuietContext& context, const Start& start, IdaEquations& equations, double max_step);
   ~IdaSession();
   IdaSession(const IdaSession&) = delete;
   IdaSession& operator=(const IdaSession&) = delete;
@@ -50,14 +70,16 @@ class IdaSession {
   void set_newton(double part_of_tolerance) {
     check(IDASetNonlinConvCoef(ida_, part_of_tolerance), "IDASetNonlinConvCoef");
   }
-  void use(SUNLinearSolver solver, SUNMatrix matrix, IDALsJacFn jacobian);
+  void set_stop(double t) { check(IDASetStopTime(ida_, t), "IDASetStopTime"); }
+  /// `matrix` may be null.
+  void use(SUNLinearSolver solver, SUNMatrix matrix);
   /// `options` as the engine wants them; what both engines have in common is set here.
   void project(const ida_projection::Constraints& constraints, ida_projection::Options options);
 
   void* ida() const { return ida_; }
   N_Vector y() const { return y_.get(); }
   N_Vector yp() const { return yp_.get(); }
-  /// Not before project().
+  /// Null before project().
   ida_projection::Projection* projection() { return projection_ ? &*projection_ : nullptr; }
   const ida_projection::Projection* projection() const {
     return projection_ ? &*projection_ : nullptr;
@@ -81,17 +103,15 @@ class IdaSession {
   std::optional<ida_projection::Projection> projection_;
 };
 
+OwnedLinearSolver dense_solver(N_Vector y, SUNMatrix matrix, SUNContext context);
+
 /// The first step of a state y with y' = yp, whose error is an eighth of what IDA allows: at order
 /// 1 IDA estimates h^2 |y''| / 4. IDA's own depends on the time asked for, and at tight tolerances
-/// is so short that changes of velocity / h are rounding.
-struct FirstStep {
-  double tolerance;              // of a step
-  double longest;                // s
-  const Eigen::VectorXd& sizes;  // beside |y|; 0 where a component does not count
-  /// y' at a time and a state, which it may complete.
-  std::function<void(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp)> rate;
-
-  double operator()(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& yp) const;
-};
+/// is so short that changes of velocity / h are rounding. It is at most `longest`, s; `sizes` are
+/// beside |y|, 0 where a component does not count; `rate` gives y' at a state, which it may
+/// complete.
+using IdaRate = std::function<void(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp)>;
+double first_step(double tolerance, double longest, const Eigen::VectorXd& sizes,
+                  const IdaSession::Start& start, const IdaRate& rate);
 
 }  // namespace tether::scene

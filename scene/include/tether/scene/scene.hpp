@@ -174,9 +174,8 @@ struct Invariant {
   Place place;                                 ///< in the file
 };
 
-/// Form of the equations of motion with joints; stabilised_index2 is that of Gear, Gupta and
-/// Leimkuhler.
-enum class Formulation : std::uint8_t { index1, index0, stabilised_index2 };
+/// Form of the equations of motion with joints: with their multipliers, or without.
+enum class Formulation : std::uint8_t { index1, index0 };
 /// Consequence of a contact problem that is neither solved nor accepted: the run ends, or goes on
 /// with a warning.
 enum class OnFailure : std::uint8_t { stop, warn };

@@ -64,7 +64,7 @@ struct Words<InvariantKind> {
 
 template <>
 struct Words<Formulation> {
-  static constexpr auto list = in_order<Formulation>({"index1", "index0", "stabilised_index2"});
+  static constexpr auto list = in_order<Formulation>({"index1", "index0"});
 };
 
 template <>

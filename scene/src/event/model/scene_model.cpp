@@ -142,8 +142,8 @@ VectorXd SceneModel::start() const {
 
 void SceneModel::add_moments() {
   for (int k = 0; k < pairs(); ++k) {
-    if (pair(k).rolling > 0) moments_.push_back({k, false, pair(k).rolling});
-    if (pair(k).torsional > 0) moments_.push_back({k, true, pair(k).torsional});
+    if (pair(k).rolling > 0) moments_.push_back({pair(k).rolling, 0, -1, k, false});
+    if (pair(k).torsional > 0) moments_.push_back({pair(k).torsional, 0, -1, k, true});
   }
 }
 
@@ -161,7 +161,7 @@ void SceneModel::find_holding(const Scene& scene) {
 }
 
 std::string SceneModel::contact_name(int contact) const {
-  if (is_moment(contact)) contact = moment(contact).pair;
+  if (is_moment(contact)) contact = moment(contact).held_by;
   if (const auto* slip = slip_law(contact))
     return "the cable \"" + spring_names_[at(slip->cable())] + "\"";
   if (is_law(contact))
@@ -349,14 +349,14 @@ Jet<double> SceneModel::surface_velocity(int body, const Touch& touch) const {
 
 // Slip e.w of the turning w of one body against the other, e a tangent, or the normal; where it
 // turns, (e.w)' = e.w' + e'.w.
-void SceneModel::evaluate_moment(const Moment& moment, ContactKinematics& out) {
-  const FeaturePair& p = pair(moment.pair);
+void SceneModel::evaluate_moment(const ContactLaw& moment, ContactKinematics& out) {
+  const FeaturePair& p = pair(moment.held_by);
   const Bodies& bodies = bodies_.all();
   const Touch touch = p.touch(bodies);
   const Vector3d n = touch.normal, n1 = touch.normal_rate;
-  const std::array<Vector3d, 2> t = tangents_of(moment.pair, n);
-  const Vector3d c1 = n1.cross(axes_[at(moment.pair)]);
-  const Vector3d first1 = (c1 - t[0] * t[0].dot(c1)) / n.cross(axes_[at(moment.pair)]).norm();
+  const std::array<Vector3d, 2> t = tangents_of(moment.held_by, n);
+  const Vector3d c1 = n1.cross(axes_[at(moment.held_by)]);
+  const Vector3d first1 = (c1 - t[0] * t[0].dot(c1)) / n.cross(axes_[at(moment.held_by)]).norm();
   const std::array<Vector3d, 2> along = {moment.spin ? n : t[0], t[1]};
   const std::array<Vector3d, 2> turning = {moment.spin ? n1 : first1,
                                            n1.cross(t[0]) + n.cross(first1)};
@@ -386,7 +386,7 @@ std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& nor
 Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
   const bool turns = is_moment(contact), spins = turns && moment(contact).spin;
-  if (turns) contact = moment(contact).pair;
+  if (turns) contact = moment(contact).held_by;
   const Touch touch = pair(contact).touch(bodies_.all());
   const Vector3d& normal = touch.normal;
   std::array<Vector3d, 2> tangent = tangents_of(contact, normal);

@@ -70,7 +70,7 @@ class SceneModel final : public Model {
   int tangents() const override { return 2; }
   ContactLaw law(int contact) const override {
     if (is_law(contact)) return laws_.law(contact - pairs(), bodies_.all());
-    if (is_moment(contact)) return law_of(moment(contact));
+    if (is_moment(contact)) return moment(contact);
     ContactLaw law{pair(contact).friction, pair(contact).restitution};
     law.conveys = conveys(pair(contact).first) || conveys(pair(contact).second);
     return law;
@@ -155,24 +155,16 @@ class SceneModel final : public Model {
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
  private:
-  /// Rolling or torsional friction of a pair.
-  struct Moment {
-    int pair;
-    bool spin;
-    double length;  // moment over normal force, m
-  };
   int first_moment() const { return pairs() + laws_.count(); }
-  const Moment& moment(int contact) const { return moments_[at(contact - first_moment())]; }
-  static ContactLaw law_of(const Moment& moment) {
-    return {moment.length, 0, -1, moment.pair, moment.spin};
-  }
+  /// Rolling or torsional friction of a pair.
+  const ContactLaw& moment(int contact) const { return moments_[at(contact - first_moment())]; }
   void add_moments();
   void find_holding(const Scene& scene);
   bool conveys(int body) const { return !surface_.empty() && surface_[at(body)].has_value(); }
   Vector3d relative_velocity(const FeaturePair& pair, const Touch& touch) const;
   /// Velocity of the surface of a body at a point, and its rate where the point moves.
   Jet<double> surface_velocity(int body, const Touch& touch) const;
-  void evaluate_moment(const Moment& moment, ContactKinematics& out);
+  void evaluate_moment(const ContactLaw& moment, ContactKinematics& out);
   double square_between(int contact, int other, double distance);
   std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
   /// Tangents with their rates, each as long as its coefficient of friction over the larger one.
@@ -188,7 +180,7 @@ class SceneModel final : public Model {
   std::vector<std::optional<SurfaceSpeed>> surface_;  // by body, of Bodies; empty: none
   std::vector<std::string> body_names_, joint_names_, spring_names_;
   LawContacts laws_;
-  std::vector<Moment> moments_;
+  std::vector<ContactLaw> moments_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
   std::vector<double> y_;       // of MovingBodies
   std::vector<Load6> loads_;

@@ -97,8 +97,8 @@ class ProductSolver {
     const Product product(problem);
     out.solved = product.rows.empty();
     if (out.solved) return out;
-    const SomeRows rows(problem.A, problem.b, product.rows);
-    const auto cones = contact::ConeProblem::dense(rows.A, rows.b, product.cones);
+    const auto cones = contact::ConeProblem::dense(problem.A(product.rows, product.rows),
+                                                   problem.b(product.rows), product.cones);
     const contact::ConeSolution found =
         last_.size() > 0 ? solver_.solve(cones, last_) : solver_.solve(cones);
     last_ = found.impulses;
@@ -106,8 +106,7 @@ class ProductSolver {
     out.solved = found.status == contact::Status::solved ||
                  found.status == contact::Status::round_off ||
                  (found.error < kNear && found.status != contact::Status::infeasible);
-    for (std::size_t r = 0; r < product.rows.size(); ++r)
-      out.x[product.rows[r]] = found.impulses[static_cast<Eigen::Index>(r)];
+    out.x(product.rows) = found.impulses;
     out.w = problem.A * out.x - problem.b;
     for (std::size_t i = 0; i < problem.parts.size(); ++i)
       out.regimes[i] = regime_of(problem, problem.parts[i], out);
@@ -145,14 +144,6 @@ std::vector<int> held_rows(const FrictionProblem& problem, const Regimes& regime
   return rows;
 }
 
-void take(const SharedForces& from, const Regimes& regimes, FrictionSolution& to) {
-  to.x = from.x;
-  to.w = from.w;
-  to.regimes = regimes.of;
-  to.error = 0;
-  to.solved = true;
-}
-
 /// The shortest forces with the regimes of an answer: what begins to slip goes against its force.
 /// Keeps contacts closed that are `closed` or do not open. The answer stays where the law has none.
 bool settle(const std::vector<bool>& closed, double none, const FrictionProblem& problem,
@@ -167,9 +158,10 @@ bool settle(const std::vector<bool>& closed, double none, const FrictionProblem&
     held.of[k] = Regime::sliding;
     held.directions[k] = force.norm() > 0 ? VectorXd(-force.normalized()) : slip.normalized();
   }
-  const SharedForces shared = share_forces(problem, held);
-  if (shared.lawful) take(shared, held, answer);
-  return shared.lawful;
+  FrictionSolution shared = share_forces(problem, held);
+  if (!shared.solved) return false;
+  answer = std::move(shared);
+  return true;
 }
 
 /// An iteration may end at any of several answers. Compliant contacts share their forces in one
@@ -214,21 +206,17 @@ bool let_slip(const ContactRows& rows, double none, const FrictionSolution& answ
 FrictionSolution solve_shared(FrictionProblem& problem, const std::vector<VectorXd>& slides,
                               double band, double far, const std::vector<bool>& closed,
                               bool decides) {
-  FrictionSolution out;
   Regimes held = all_held(problem, slides);
   problem.b = without_contradictions(problem.A, problem.b, held_rows(problem, held), band);
-  const SharedForces shared = share_forces(problem, held);
-  if (shared.lawful) {
-    take(shared, held, out);
-    return out;
-  }
+  FrictionSolution out = share_forces(problem, held);
+  if (out.solved) return out;
+  decides = decides && out.shared;
   FrictionProblem with_slips = problem;
   for (std::size_t k = 0; k < slides.size(); ++k)
     if (slides[k].size() > 0) {
       const ConePart& p = problem.parts[k];
       p.slip_of(with_slips.b) -= far * slides[k].head(p.slips);
     }
-  decides = decides && shared.several;
   const double none = kNoChange * problem.b.cwiseAbs().maxCoeff();
   if (decides && solve_compliant(closed, none, with_slips, problem, held, out)) return out;
   out = solve_friction(with_slips);
@@ -278,8 +266,6 @@ FrictionSolution solve_friction(const FrictionProblem& problem) {
   if (out.solved) sharpen(problem, out);
   return out;
 }
-
-using linalg::at;
 
 ContactRows::ContactRows(Model& model, std::vector<int> contacts)
     : model_(model), contacts_(std::move(contacts)), factor_(kDependent) {

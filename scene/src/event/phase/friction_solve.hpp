@@ -2,14 +2,53 @@
 // (method, eq. 7, 8). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <tether/contact/problem.hpp>
 #include <tether/linalg/index.hpp>
 #include <tether/linalg/least_squares.hpp>
 #include <vector>
 
 #include "event/model/model.hpp"
-#include "shared_forces.hpp"
 
 namespace tether::scene::event {
+
+constexpr double kDependent = 1e-11;     // of rows: they depend on others
+constexpr double kHeldByJoints = 1e-10;  // of a mobility without joints
+constexpr double kNoForce = 1e-9;        // of the largest force
+constexpr double kNoChange = 3e-9;       // of the largest acceleration or velocity
+
+/// One contact in a product of cones, by its rows of w = A x - b: its normal, if it has one, and
+/// then its slip. |slip force| <= mu x_n + bound, x_n its own normal force or that of the contact
+/// that holds it, which comes before it.
+struct ConePart {
+  int first = 0, slips = 0;
+  int normal = -1;  ///< the row of x_n; -1: there is none
+  double mu = 0, bound = 0;
+  double holding = 0;  ///< mu without slip
+
+  bool has_normal() const { return normal == first; }
+  bool is_held() const { return normal >= 0 && normal != first; }
+  int slip() const { return has_normal() ? first + 1 : first; }
+  int rows() const { return slips + (has_normal() ? 1 : 0); }
+  double limit(const VectorXd& x) const { return normal < 0 ? bound : mu * x[normal] + bound; }
+  auto slip_of(const VectorXd& x) const { return x.segment(slip(), slips); }
+  auto slip_of(VectorXd& x) const { return x.segment(slip(), slips); }
+};
+
+/// w = A x - b over a product of cones.
+struct FrictionProblem {
+  MatrixXd A;
+  VectorXd b;
+  std::vector<ConePart> parts;
+};
+
+/// Answer of a frictional problem.
+struct FrictionSolution {
+  bool solved = false;
+  bool shared = false;  ///< known only of share_forces: other forces lead to the same w
+  VectorXd x, w;
+  std::vector<contact::Regime> regimes;
+  double error = 0;
+};
 
 /// Some contacts of a model at the state that is set, as a product of cones: rows L of each, and
 /// what forces x in them do to velocities through the joints,
@@ -67,5 +106,33 @@ struct AccelerationSolution {
 };
 AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
                                          double part, const std::vector<bool>& closed = {});
+
+// Contacts may share their forces in more than one way (method, section 6.3): for feet of one body
+// on a plane, or corners of one face on another, accelerations may be unique while forces are not,
+// and with friction several sets of regimes may obey Coulomb's law. An iteration ends at any of
+// them. With the regimes given, the shortest lawful forces are unique, so symmetric configurations
+// stay symmetric.
+
+/// Regimes of a problem, by part. What slides has the force -limit d.
+struct Regimes {
+  std::vector<contact::Regime> of;
+  std::vector<VectorXd> directions;  ///< d; empty where it does not slide
+  std::vector<bool> fixed;           ///< d stays; else it is that of the slip
+};
+
+/// The shortest x with no normal velocity where contacts are closed and no slip where they stick.
+/// Directions that are not fixed turn to those of w. Solved where the law allows these forces,
+/// which are shared.
+FrictionSolution share_forces(const FrictionProblem& problem, Regimes& regimes);
+
+/// Solves the linear equations of the answer's regimes, which removes the error of the iteration:
+/// stuck rows vanish, and sliding forces have their limit. Kept only if it obeys the law.
+void sharpen(const FrictionProblem& problem, FrictionSolution& answer);
+
+/// Projects b onto the range of A restricted to these rows, if that changes it by at most `band`.
+/// Dependent rows contradict each other by the error of the state; no solution would obey all of
+/// them.
+VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
+                                double band);
 
 }  // namespace tether::scene::event

@@ -3,11 +3,7 @@
 #include "phase.hpp"
 
 #include <fmt/format.h>
-#include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
-#include <sunnonlinsol/sunnonlinsol_newton.h>
-
-#include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
 
@@ -18,200 +14,120 @@ constexpr double kIncrement = 1e-7, kLargestIncrement = 1e-3;
 constexpr double kLargestSlipChange = 0.5;    // of a slip, since Newton's matrix was made
 constexpr double kLargestStateChange = 1e-5;  // of the state, since d(y')/dy was found
 
-#if SUNDIALS_VERSION_MAJOR >= 7
-using Flag = sunbooleantype;
-#else
-using Flag = booleantype;
-#endif
-
 }  // namespace
 
-struct Phase::Ida {
-  Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
-      double longest_first);
-
-  static int weights(N_Vector y, N_Vector w, void* self);
-  double size_of(int i, double value) const { return sizes[i] + std::abs(value); }
-  static int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self);
-  static int jacobian(double t, double cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix J,
-                      void* self, N_Vector, N_Vector, N_Vector);
-  static int newton(SUNNonlinearSolver solver, N_Vector predicted, N_Vector correction,
-                    N_Vector weights, double tolerance, Flag renew, void* ida);
-  bool has_turned(double t, N_Vector predicted);
-  bool may_reuse(double t, N_Vector at);
-  void differentiate(double t, const double* from);
-
-  Motion& motion;
-  double tolerance, start;
-  QuietContext context;
-  OwnedMatrix matrix;
-  OwnedLinearSolver solver;
-  OwnedCorrector corrector;
-  decltype(SUNNonlinearSolver {} -> ops->solve) iterate = nullptr;  // SUNDIALS' Newton
-  std::optional<IdaSession> session;
-  VectorXd rate, near, near_rate, sizes;
-  VectorXd slips, slips_of_matrix;
-  MatrixXd slope;  // d(y')/dy at
-  VectorXd slope_at;
-  double asked_time = -1;
-};
-
-Phase::Ida::Ida(Motion& of, double tol, double max_step, double start_time, const VectorXd& y0,
-                double longest_first)
-    : motion(of), tolerance(tol), start(start_time) {
+Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
+             double longest_first, double length)
+    : IdaEquations(tolerance, tolerance * motion.model().sizes()),
+      motion_(motion),
+      start_(t),
+      length_(length),
+      sizes_(motion.model().sizes()),
+      rate_(motion.size()) {
   const int N = motion.size();
-  sizes = motion.model().sizes();
-  rate.setZero(N);
-  near_rate.setZero(N);
-  VectorXd rate0(N);
-  motion.rate(start, y0.data(), rate0.data());
+  VectorXd yp(N);
+  motion.rate(start_, y.data(), yp.data());
   const VectorXd id = VectorXd::Ones(N);
-  session.emplace(context, IdaSession::Start{0, y0, rate0, id}, residual, weights, this, max_step);
-  const FirstStep first{tolerance, kLongestFirstStep, sizes,
-                        [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
-                          motion.rate(start + at, ahead.data(), rate_ahead.data());
-                        }};
-  const double h = first(0, y0, rate0);
-  session->set_first_step(longest_first > 0 ? std::min(h, longest_first) : h);
-  matrix.reset(SUNDenseMatrix(N, N, context));
-  solver.reset(N <= ida_projection::kLargestFastDense
-                   ? ida_projection::fast_dense_solver(session->y(), matrix.get())
-                   : SUNLinSol_Dense(session->y(), matrix.get(), context));
-  session->use(solver.get(), matrix.get(), jacobian);
-  session->set_newton(kNewton);
-  corrector.reset(SUNNonlinSol_Newton(session->y(), context));
-  iterate = corrector->ops->solve;
-  corrector->ops->solve = newton;
-  ida_projection::Constraints constraints;
-  constraints.count = motion.constraint_count();
-  if (constraints.count == 0) {
-    session->check(IDASetNonlinearSolver(session->ida(), corrector.get()), "IDASetNonlinearSolver");
-    return;
-  }
-  constraints.value = [this](double t, ida_projection::ConstVector at, ida_projection::Vector g) {
-    motion.constraints(start + t, at.data(), g.data());
-  };
-  constraints.jacobian = ida_projection::DenseJacobian(
-      [this](double t, ida_projection::ConstVector at, ida_projection::Matrix C) {
-        motion.constraint_gradient(start + t, at.data(), C);
-      });
-  ida_projection::Options options;
-  options.nonlinear_solver = corrector.get();
-  session->project(constraints, options);
+  const IdaSession::Start start{0, y, yp, id};
+  session_.emplace(context_, start, *this, max_step);
+  const double h = first_step(tolerance, kLongestFirstStep, sizes_, start,
+                              [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
+                                motion.rate(start_ + at, ahead.data(), rate_ahead.data());
+                              });
+  session_->set_first_step(longest_first > 0 ? std::min(h, longest_first) : h);
+  matrix_.reset(SUNDenseMatrix(N, N, context_));
+  solver_ = dense_solver(session_->y(), matrix_.get(), context_);
+  session_->use(solver_.get(), matrix_.get());
+  session_->set_newton(kNewton);
+  project();
+  if (std::isfinite(length_)) session_->set_stop(length_);
 }
 
-int Phase::Ida::weights(N_Vector y, N_Vector w, void* self) {
-  const Ida& me = *static_cast<Ida*>(self);
-  for (int i = 0; i < me.sizes.size(); ++i)
-    N_VGetArrayPointer(w)[i] =
-        1 / (me.tolerance * std::abs(N_VGetArrayPointer(y)[i]) + me.tolerance * me.sizes[i]);
-  return 0;
+void Phase::residual(double t, const double* y, const double* yp, double* r) {
+  motion_.rate(start_ + t, y, rate_.data());
+  for (int i = 0; i < rate_.size(); ++i) r[i] = yp[i] - rate_[i];
 }
 
-int Phase::Ida::residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* self) {
-  Ida& me = *static_cast<Ida*>(self);
-  me.motion.rate(me.start + t, N_VGetArrayPointer(y), me.rate.data());
-  const double* derivative = N_VGetArrayPointer(yp);
-  double* out = N_VGetArrayPointer(r);
-  double sum = 0;
-  for (int i = 0; i < me.rate.size(); ++i) sum += out[i] = derivative[i] - me.rate[i];
-  return std::isfinite(sum) ? 0 : 1;
-}
-
-// The force of a slip s turns with 1 / |s|. A matrix of a slip that was far shorter takes errors
-// across it for small ones: Newton's test lets them pass.
-bool Phase::Ida::has_turned(double t, N_Vector predicted) {
-  motion.slips_with_friction(start + t, N_VGetArrayPointer(predicted), slips);
-  const Eigen::Index n = motion.model().tangents();
-  for (Eigen::Index k = 0; k < slips.size(); k += n) {
-    const auto now = slips.segment(k, n), then = slips_of_matrix.segment(k, n);
+// The force of a slip s turns with 1 / |s|.
+bool Phase::has_turned(double t, N_Vector y) {
+  motion_.slips_with_friction(start_ + t, N_VGetArrayPointer(y), slips_);
+  const Eigen::Index n = motion_.model().tangents();
+  for (Eigen::Index k = 0; k < slips_.size(); k += n) {
+    const auto now = slips_.segment(k, n), then = slips_of_matrix_.segment(k, n);
     if ((now - then).norm() > kLargestSlipChange * std::min(now.norm(), then.norm())) return true;
   }
   return false;
 }
 
-int Phase::Ida::newton(SUNNonlinearSolver solver, N_Vector predicted, N_Vector correction,
-                       N_Vector weights, double tolerance, Flag renew, void* ida) {
-  double t = 0, cj = 0;
-  N_Vector yy, yp, at, rate, r;
-  void* self = nullptr;
-  IDAGetNonlinearSystemData(ida, &t, &yy, &yp, &at, &rate, &r, &cj, &self);
-  Ida& me = *static_cast<Ida*>(self);
-  if (me.slips_of_matrix.size() > 0 && me.has_turned(t, predicted)) renew = SUNTRUE;
-  return me.iterate(solver, predicted, correction, weights, tolerance, renew, ida);
+void Phase::project() {
+  ida_projection::Constraints constraints;
+  constraints.count = motion_.constraint_count();
+  if (constraints.count == 0) return;
+  constraints.value = [this](double t, ida_projection::ConstVector at, ida_projection::Vector g) {
+    motion_.constraints(start_ + t, at.data(), g.data());
+  };
+  constraints.jacobian = ida_projection::DenseJacobian(
+      [this](double t, ida_projection::ConstVector at, ida_projection::Matrix C) {
+        motion_.constraint_gradient(start_ + t, at.data(), C);
+      });
+  session_->project(constraints, {});
 }
 
 // The first steps of a phase move the state by nothing: what changes is cj. Where IDA asks twice at
 // one time its corrector has failed.
-bool Phase::Ida::may_reuse(double t, N_Vector at) {
-  const bool failed = t == asked_time;
-  asked_time = t;
-  if (failed || slope_at.size() == 0) return false;
-  for (Eigen::Index i = 0; i < slope_at.size(); ++i) {
-    const double there = N_VGetArrayPointer(at)[i];
-    if (!(std::abs(there - slope_at[i]) <=
+bool Phase::may_reuse(double t, N_Vector y) {
+  const bool failed = t == asked_time_;
+  asked_time_ = t;
+  if (failed || slope_at_.size() == 0) return false;
+  for (Eigen::Index i = 0; i < slope_at_.size(); ++i) {
+    const double there = N_VGetArrayPointer(y)[i];
+    if (!(std::abs(there - slope_at_[i]) <=
           kLargestStateChange * size_of(static_cast<int>(i), there)))
       return false;
   }
-  return !has_turned(t, at);
+  return !has_turned(t, y);
 }
 
-void Phase::Ida::differentiate(double t, const double* from) {
-  const int N = motion.size();
-  motion.slips_with_friction(start + t, from, slips_of_matrix);
-  near = slope_at = Eigen::Map<const VectorXd>(from, N);
-  motion.rate(start + t, near.data(), rate.data());
+// By differences: Newton's matrix decides how fast it converges, not where to.
+void Phase::differentiate(double t, const double* y) {
+  const int N = motion_.size();
+  motion_.slips_with_friction(start_ + t, y, slips_of_matrix_);
+  VectorXd near = Eigen::Map<const VectorXd>(y, N), near_rate = VectorXd::Zero(N);
+  slope_at_ = near;
+  motion_.rate(start_ + t, near.data(), rate_.data());
   // Friction turns with the slip: differences are short against it.
-  const double longest = kLargestIncrement * motion.smallest_slip();
-  slope.setZero(N, N);
+  const double longest = kLargestIncrement * motion_.smallest_slip();
+  slope_.setZero(N, N);
   for (int j = 0; j < N; ++j) {
-    if (j == motion.work()) continue;
-    const double kept = near[j];
-    double step = kIncrement * std::max(sizes[j], std::abs(kept));
-    if (j >= motion.coordinates()) step = std::min(step, longest);
-    near[j] = kept + step;
-    motion.rate(start + t, near.data(), near_rate.data());
-    near[j] = kept;
-    slope.col(j) = (near_rate - rate) / step;
+    if (j == motion_.work()) continue;
+    double step = kIncrement * std::max(sizes_[j], std::abs(slope_at_[j]));
+    if (j >= motion_.coordinates()) step = std::min(step, longest);
+    near[j] = slope_at_[j] + step;
+    motion_.rate(start_ + t, near.data(), near_rate.data());
+    near[j] = slope_at_[j];
+    slope_.col(j) = (near_rate - rate_) / step;
   }
 }
 
-// cj - d(y')/dy by differences: Newton's matrix decides how fast it converges, not where to.
-int Phase::Ida::jacobian(double t, double cj, N_Vector y, N_Vector, N_Vector, SUNMatrix J,
-                         void* self, N_Vector, N_Vector, N_Vector) {
-  Ida& me = *static_cast<Ida*>(self);
-  const int N = me.motion.size();
-  if (!me.may_reuse(t, y)) me.differentiate(t, N_VGetArrayPointer(y));
-  for (int j = 0; j < N; ++j) {
-    Eigen::Map<VectorXd>(SM_COLUMN_D(J, j), N) = -me.slope.col(j);
-    SM_ELEMENT_D(J, j, j) += cj;
-  }
-  return 0;
+// cj - d(y')/dy
+void Phase::jacobian(double t, double cj, N_Vector y, N_Vector, SUNMatrix J) {
+  if (!may_reuse(t, y)) differentiate(t, N_VGetArrayPointer(y));
+  const int N = motion_.size();
+  Eigen::Map<MatrixXd> out(SUNDenseMatrix_Data(J), N, N);
+  out = -slope_;
+  out.diagonal().array() += cj;
 }
-
-Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
-             double longest_first, double length)
-    : motion_(motion),
-      tolerance_(tolerance),
-      start_(t),
-      length_(length),
-      ida_(std::make_unique<Ida>(motion, tolerance, max_step, t, y, longest_first)) {
-  if (std::isfinite(length_))
-    ida_->session->check(IDASetStopTime(ida_->session->ida(), length_), "IDASetStopTime");
-}
-
-Phase::~Phase() = default;
 
 void Phase::step() {
   double t = 0;
-  const int flag = ida_->session->solve(end_ + 1, t, IDA_ONE_STEP);
+  const int flag = session_->solve(end_ + 1, t, IDA_ONE_STEP);
   if (flag < 0) {
     const double unit = motion_.model().time_unit();
     std::string text = fmt::format(
         "the event engine's smooth phase that began at t = {:.9g} s stopped {:.3g} s "
         "later: {}. {}",
-        unit * start_, unit * end_, IdaSession::name(flag), ida_->context.message());
-    const ida_projection::Projection* projection = ida_->session->projection();
+        unit * start_, unit * end_, IdaSession::name(flag), context_.message());
+    const ida_projection::Projection* projection = session_->projection();
     if (projection != nullptr && !projection->message().empty())
       text += " Projection: " + projection->message();
     throw SimulationError(text + " Try another [event] tolerance.");
@@ -220,17 +136,11 @@ void Phase::step() {
   end_ = t;
 }
 
-void Phase::at(double time, VectorXd& y) const { ida_->session->at(time, y); }
-
-bool Phase::projected_at(double time, VectorXd& y) { return ida_->session->projected_at(time, y); }
-
 bool Phase::has_weak_rows() const {
   VectorXd y;
   at(end_, y);
   return motion_.other_joint_rows_are_better(start_ + end_, y);
 }
-
-Counts Phase::counts() const { return ida_->session->counts(); }
 
 // Newton's shortest moves; few, since only what an event left is mended.
 bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y) {

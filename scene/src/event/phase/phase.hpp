@@ -2,44 +2,56 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tether/scene/engine.hpp>
-
 #include "motion.hpp"
+#include "sundials/ida_session.hpp"
 
 namespace tether::scene::event {
 
 /// From (t, y) on, with the modes that `motion` has. Its clock starts at 0, so that steps far
 /// shorter than the rounding of t can be taken.
-class Phase {
+class Phase : public IdaEquations {
  public:
   /// `tolerance`: rtol and atol of IDA; `longest_first`: the first step is no longer, 0: free.
   /// No step passes `length` (s, may be infinite), where forces have a kink.
   Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
         double longest_first, double length);
-  ~Phase();
   Phase(const Phase&) = delete;
   Phase& operator=(const Phase&) = delete;
 
   /// One step of IDA; throws SimulationError.
   void step();
-  double tolerance() const { return tolerance_; }  ///< of IDA
-  double start() const { return start_; }          ///< s
-  double step_begin() const { return begin_; }     ///< since the start, s
+  double start() const { return start_; }       ///< s
+  double step_begin() const { return begin_; }  ///< since the start, s
   double step_end() const { return end_; }
   bool is_at_end() const { return end_ >= length_; }  ///< of its length
   /// y at a time of the last step, since the start: interpolated.
-  void at(double time, VectorXd& y) const;
-  /// The same, moved onto the constraints; false: it could not be.
-  bool projected_at(double time, VectorXd& y);
+  void at(double time, VectorXd& y) const { session_->at(time, y); }
+  /// The same, moved onto the constraints.
+  void projected_at(double time, VectorXd& y) { session_->projected_at(time, y); }
   /// Joints would be better held by other rows than those that were chosen at the start.
   bool has_weak_rows() const;
-  Counts counts() const;  ///< of IDA
+  Counts counts() const { return session_->counts(); }  ///< of IDA
 
  private:
-  struct Ida;
+  void residual(double t, const double* y, const double* yp, double* r) override;
+  void jacobian(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) override;
+  void project();
+  double size_of(int i, double value) const { return sizes_[i] + std::abs(value); }
+  bool has_turned(double t, N_Vector y);
+  bool may_reuse(double t, N_Vector y);
+  void differentiate(double t, const double* y);
+
   Motion& motion_;
-  double tolerance_, start_, begin_ = 0, end_ = 0, length_;
-  std::unique_ptr<Ida> ida_;
+  double start_, begin_ = 0, end_ = 0, length_;
+  VectorXd sizes_, rate_;
+  QuietContext context_;
+  OwnedMatrix matrix_;
+  OwnedLinearSolver solver_;
+  std::optional<IdaSession> session_;
+  VectorXd slips_, slips_of_matrix_;
+  MatrixXd slope_;  // d(y')/dy at slope_at_
+  VectorXd slope_at_;
+  double asked_time_ = -1;
 };
 
 /// y moved onto the constraints of the motion at t in the weights of the tolerance, as for the

@@ -5,14 +5,9 @@
 
 namespace tether::scene::event {
 
-namespace {
-
 using linalg::at;
 
-}  // namespace
-
 void RowIslands::choose(const MatrixXd& R, const MatrixXd& C, int block) {
-  block_ = block;
   const int rows = static_cast<int>(R.rows()), bodies = static_cast<int>(R.cols()) / block;
   std::vector<int> first(at(rows), -1);
   linalg::DisjointSets sets(bodies);
@@ -36,33 +31,17 @@ void RowIslands::choose(const MatrixXd& R, const MatrixXd& C, int block) {
     islands_[at(k)].rows.push_back(i);
   }
   for (int b = 0; b < bodies; ++b)
-    if (const int k = island_of[at(sets.root(b))]; k >= 0) islands_[at(k)].bodies.push_back(b);
-}
-
-void RowIslands::take(const Island& island, const MatrixXd& R, const MatrixXd& MC) {
-  const auto m = static_cast<Eigen::Index>(island.rows.size());
-  const auto n = static_cast<Eigen::Index>(island.bodies.size());
-  R_.resize(m, block_ * n);
-  MC_.resize(block_ * n, m);
-  for (Eigen::Index i = 0; i < m; ++i)
-    for (Eigen::Index b = 0; b < n; ++b) {
-      const int row = island.rows[static_cast<std::size_t>(i)];
-      const int from = block_ * island.bodies[static_cast<std::size_t>(b)];
-      R_.row(i).segment(block_ * b, block_) = R.row(row).segment(from, block_);
-      MC_.col(i).segment(block_ * b, block_) = MC.col(row).segment(from, block_);
-    }
+    if (const int k = island_of[at(sets.root(b))]; k >= 0)
+      for (int j = 0; j < block; ++j) islands_[at(k)].velocities.push_back(block * b + j);
 }
 
 void RowIslands::factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& scale) {
   for (Island& each : islands_) {
-    if (static_cast<Eigen::Index>(each.rows.size()) == R.rows()) {
+    if (static_cast<Eigen::Index>(each.rows.size()) == R.rows())
       K_.noalias() = scale.asDiagonal() * R * MC;
-    } else {
-      take(each, R, MC);
-      K_.noalias() = R_ * MC_;
-      for (Eigen::Index i = 0; i < K_.rows(); ++i)
-        K_.row(i) *= scale[each.rows[static_cast<std::size_t>(i)]];
-    }
+    else
+      K_ = scale(each.rows).asDiagonal() *
+           (MatrixXd(R(each.rows, each.velocities)) * MatrixXd(MC(each.velocities, each.rows)));
     each.factor.factor(K_);
   }
 }
@@ -74,17 +53,8 @@ double RowIslands::work() const {
 }
 
 VectorXd RowIslands::solve(const VectorXd& right) const {
-  if (islands_.size() == 1 && static_cast<Eigen::Index>(islands_[0].rows.size()) == right.size())
-    return islands_[0].factor.solve(right);
-  VectorXd out = VectorXd::Zero(right.size()), part;
-  for (const Island& each : islands_) {
-    part.resize(static_cast<Eigen::Index>(each.rows.size()));
-    for (std::size_t i = 0; i < each.rows.size(); ++i)
-      part[static_cast<Eigen::Index>(i)] = right[each.rows[i]];
-    part = each.factor.solve(part);
-    for (std::size_t i = 0; i < each.rows.size(); ++i)
-      out[each.rows[i]] = part[static_cast<Eigen::Index>(i)];
-  }
+  VectorXd out = VectorXd::Zero(right.size());
+  for (const Island& each : islands_) out(each.rows) = each.factor.solve(right(each.rows));
   return out;
 }
 

@@ -1,10 +1,7 @@
 // Tether: forces of contacts that share them in more than one way. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "shared_forces.hpp"
+#include "friction_solve.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <tether/linalg/least_squares.hpp>
 #include <tether/linalg/pivoted_qr.hpp>
 
 namespace tether::scene::event {
@@ -48,15 +45,14 @@ class HeldRows {
       for (int k = 0; k < p.slips && !slides(i); ++k) take(p.slip() + k);
       if (slides(i) && p.normal < 0) p.slip_of(known_) = -p.bound * regimes.directions[at(i)];
     }
-    const SomeRows rows(problem.A, problem.b - problem.A * known_, rows_);
-    right_ = rows.b;
-    S_ = rows.A;
+    const VectorXd right = problem.b - problem.A * known_;
+    right_ = right(rows_);
+    S_ = problem.A(rows_, rows_);
     for (const int i : closed_) {
       const ConePart& p = part(i);
       if (!slides(i) || p.normal < 0) continue;
       const VectorXd column = problem.A.middleCols(p.slip(), p.slips) * regimes.directions[at(i)];
-      const int c = place_[at(p.normal)];
-      for (int r = 0; r < S_.rows(); ++r) S_(r, c) -= p.mu * column[rows_[at(r)]];
+      S_.col(place_[at(p.normal)]) -= p.mu * column(rows_);
     }
   }
 
@@ -114,7 +110,7 @@ class HeldRows {
   }
   VectorXd forces() const {
     VectorXd x = known_;
-    for (std::size_t r = 0; r < rows_.size(); ++r) x[rows_[r]] = x_[static_cast<Eigen::Index>(r)];
+    x(rows_) = x_;
     for (const int i : closed_)
       if (slides(i) && part(i).normal >= 0)
         part(i).slip_of(x) = -part(i).mu * x[part(i).normal] * regimes_.directions[at(i)];
@@ -194,7 +190,7 @@ class HeldRows {
 
 /// Directions of slip turn towards those of w: where they hardly slip, w turns by what the friction
 /// moves. Returns how far w is from them.
-double turn(const FrictionProblem& problem, const SharedForces& now, Regimes& regimes) {
+double turn(const FrictionProblem& problem, const FrictionSolution& now, Regimes& regimes) {
   std::vector<std::size_t> turning;
   for (std::size_t i = 0; i < regimes.of.size(); ++i)
     if (regimes.of[i] == Regime::sliding && !regimes.fixed[i]) turning.push_back(i);
@@ -219,48 +215,28 @@ double turn(const FrictionProblem& problem, const SharedForces& now, Regimes& re
 
 }  // namespace
 
-FrictionProblem FrictionProblem::of_contacts(const MatrixXd& A, const VectorXd& b,
-                                             const VectorXd& mu) {
-  FrictionProblem out{A, b, {}};
-  const int block = static_cast<int>(b.size() / mu.size());
-  for (int i = 0; i < static_cast<int>(mu.size()); ++i)
-    out.parts.push_back({block * i, block - 1, block * i, mu[i]});
-  return out;
-}
-
-SomeRows::SomeRows(const MatrixXd& whole, const VectorXd& right, const std::vector<int>& rows)
-    : A(rows.size(), rows.size()), b(rows.size()) {
-  const int m = static_cast<int>(rows.size());
-  for (int r = 0; r < m; ++r) {
-    b[r] = right[rows[at(r)]];
-    for (int c = 0; c < m; ++c) A(r, c) = whole(rows[at(r)], rows[at(c)]);
-  }
-}
-
 VectorXd without_contradictions(const MatrixXd& A, const VectorXd& b, const std::vector<int>& rows,
                                 double band) {
   if (rows.empty()) return b;
-  const SomeRows part(A, b, rows);
   linalg::PivotedQr factor(kDependent);
-  factor.factor(part.A);
+  factor.factor(A(rows, rows));
   const MatrixXd none = factor.left_null_space();
-  const VectorXd against = none * (none.transpose() * part.b);
+  const VectorXd against = none * (none.transpose() * b(rows));
   VectorXd out = b;
-  if (against.cwiseAbs().maxCoeff() <= band)
-    for (int r = 0; r < against.size(); ++r) out[rows[at(r)]] -= against[r];
+  if (against.cwiseAbs().maxCoeff() <= band) out(rows) -= against;
   return out;
 }
 
-SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes) {
+FrictionSolution share_forces(const FrictionProblem& problem, Regimes& regimes) {
   const double none = kNoChange * problem.b.cwiseAbs().maxCoeff();
-  SharedForces out;
+  FrictionSolution out;
   double off = 0, before = 0;
   for (int pass = 0; pass < kTurns; ++pass) {
     HeldRows rows(problem, regimes);
     const bool held = rows.solve();
     rows.find_other_forces();
-    out.several = rows.several();
-    if (!held || !out.several || !rows.resists() || !rows.move_into_cones()) return out;
+    out.shared = rows.several();
+    if (!held || !out.shared || !rows.resists() || !rows.move_into_cones()) return out;
     out.x = rows.forces();
     out.w = problem.A * out.x - problem.b;
     const Regimes now = regimes;
@@ -271,9 +247,10 @@ SharedForces share_forces(const FrictionProblem& problem, Regimes& regimes) {
       break;
     }
   }
-  out.lawful = off <= none;
+  out.regimes = regimes.of;
+  out.solved = off <= none;
   for (const ConePart& p : problem.parts)
-    if (p.has_normal()) out.lawful = out.lawful && out.w[p.first] >= -none;
+    if (p.has_normal()) out.solved = out.solved && out.w[p.first] >= -none;
   return out;
 }
 

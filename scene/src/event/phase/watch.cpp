@@ -56,8 +56,7 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
   functions_.clear();
   force_ = 0;
   const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back(
-        {what, contact, closed, false, leaves, false, false, false, 0, 0, 0, 0, 0, 0, 0});
+    functions_.push_back({what, contact, closed, leaves});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
@@ -80,20 +79,16 @@ void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leavin
 
 void Watcher::arm(Function& f) {
   const bool gap = f.what == Watch::gap;
-  f.dormant = f.far || (gap && f.value < -bands().gap(f.contact));
-  f.armed = false;
-  if (f.far) return;
+  if (f.is(State::far)) return;
+  f.state = gap && f.value < -bands().gap(f.contact) ? State::beside : State::waiting;
   f.was_near = gap && std::abs(f.value) <= bands().gap(f.contact);
-  if (gap && f.value < 0 && !f.dormant) {
-    f.level = f.value;
-    f.value = 0;
-  }
-  if (f.what == Watch::border && f.value < 0) {  // it comes in over it
+  // A border is come in over.
+  if ((gap || f.what == Watch::border) && f.value < 0 && f.is(State::waiting)) {
     f.level = f.value;
     f.value = 0;
   }
   const bool closing = gap && f.value > 0 && f.slope < -bands().approach(f.contact);
-  f.armed = closing || f.value > band(f);
+  if (closing || f.value > band(f)) f.state = State::armed;
 }
 
 double Watcher::band(const Function& f) const {
@@ -162,13 +157,14 @@ void Watcher::wake(Phase& phase, const VectorXd& at_end, double by) {
   model.set(phase.start() + phase.step_end(), at_end.data(), at_end.data() + motion_.coordinates());
   waking_.clear();
   for (std::size_t k = 0; k < functions_.size(); ++k)
-    if (functions_[k].far && !model.is_apart(functions_[k].contact, by)) waking_.push_back(k);
+    if (functions_[k].is(State::far) && !model.is_apart(functions_[k].contact, by))
+      waking_.push_back(k);
   if (waking_.empty()) return;
   phase.at(phase.step_begin(), y_);
   model.set(phase.start() + phase.step_begin(), y_.data(), y_.data() + motion_.coordinates());
   for (const std::size_t k : waking_) {
     Function& f = functions_[k];
-    f.far = false;
+    f.state = State::waiting;
     f.level = 0;
     f.value = of_state(f);
     f.passes = model.passes(f.contact);
@@ -187,8 +183,7 @@ void Watcher::evaluate(double t, const VectorXd& y, double by) {
       force_ = std::max(force_, std::abs(motion_.normal_force(static_cast<int>(k))));
   for (Function& f : functions_) {
     if (f.what == Watch::gap && motion_.model().is_apart(f.contact, by)) {
-      f.far = f.dormant = true;
-      f.armed = false;
+      f.state = State::far;
       continue;
     }
     f.before = f.value;
@@ -199,9 +194,7 @@ void Watcher::evaluate(double t, const VectorXd& y, double by) {
   }
 }
 
-double Watcher::value(Function f, double t, const VectorXd& y) { return value_of(f, t, y); }
-
-double Watcher::value_of(Function& f, double t, const VectorXd& y) {
+double Watcher::value(Function& f, double t, const VectorXd& y) {
   if (f.what == Watch::gap)
     motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
   else
@@ -209,40 +202,38 @@ double Watcher::value_of(Function& f, double t, const VectorXd& y) {
   return of_state(f);
 }
 
-double Watcher::slope(Function f, double t, const VectorXd& y) {
-  value_of(f, t, y);
-  return f.slope;
-}
-
 // Whether a gap or slip that is positive at both ends of a step, and falls, then rises, can reach
 // zero.
 bool Watcher::may_dip(const Function& f) const {
-  return (f.what == Watch::gap || f.what == Watch::slip) && f.armed && f.slope_before < 0 &&
-         f.slope > 0 && f.before > 0 &&
+  return (f.what == Watch::gap || f.what == Watch::slip) && f.is(State::armed) &&
+         f.slope_before < 0 && f.slope > 0 && f.before > 0 &&
          std::min(f.before, f.value) < (end_ - begin_) * std::max(-f.slope_before, f.slope);
 }
 
 // The least or largest value of a gap or slip that turns in the last step.
-double Watcher::turn(Phase& phase, const Function& f, double& when) {
-  const double a = begin_, b = end_;
+double Watcher::turn(Phase& phase, Function f, double& when) {
+  const double a = begin_, b = end_, before = f.slope_before, after = f.slope;
   const auto slope_at = [&](double time) {
     phase.at(time, y_);
-    return slope(f, phase.start() + time, y_);
+    value(f, phase.start() + time, y_);
+    return f.slope;
   };
-  when = zero_between(slope_at, a, f.slope_before, b, f.slope, 1e-9 * (b - a));
+  when = zero_between(slope_at, a, before, b, after, 1e-9 * (b - a));
   phase.at(when, y_);
   return value(f, phase.start() + when, y_);
 }
 
-Zero Watcher::locate(Phase& phase, const Function& f) {
+Zero Watcher::locate(Phase& phase, Function f) {
   double a = begin_, b = end_;
   double fa = f.before, fb = f.value;
+  const double slope_before = f.slope_before, slope_after = f.slope;
   const auto at = [&](double time) {
     phase.at(time, y_);
     return value(f, phase.start() + time, y_);
   };
   if (fb >= 0) fb = turn(phase, f, b);
-  if (fa <= 0 && f.what == Watch::gap && f.slope_before > 0 && f.slope < 0) fa = turn(phase, f, a);
+  if (fa <= 0 && f.what == Watch::gap && slope_before > 0 && slope_after < 0)
+    fa = turn(phase, f, a);
   Zero zero{f.what, f.contact, a, {}};
   const double resolution = 4e-16 * b;
   if (f.what == Watch::support) {
@@ -275,7 +266,7 @@ Zero Watcher::locate(Phase& phase, const Function& f) {
 
 // Accelerations of contacts that can no longer rest begin at zero and grow; by their rate where
 // they leave the band. They jump where friction falls as contacts slip, which is when it happens.
-double Watcher::lag(Phase& phase, const Function& f, double time) {
+double Watcher::lag(Phase& phase, Function f, double time) {
   const double later = time + 0.01 * (phase.step_end() - time);
   if (!(later > time)) return 0;
   VectorXd y;
@@ -300,9 +291,9 @@ double Watcher::way(Phase& phase, const VectorXd& at_end) {
 
 // Whether a function has a zero within the interval that is searched.
 bool Watcher::is_hit(Phase& phase, const Function& f) {
-  bool hit = f.value < (f.armed ? 0 : -band(f));
+  bool hit = f.value < (f.is(State::armed) ? 0 : -band(f));
   // Else it is on its way out; its first gaps are lost in rounding.
-  const bool from_zero = !f.armed || (f.leaving && f.value > -bands().gap(f.contact));
+  const bool from_zero = !f.is(State::armed) || (f.leaving && f.value > -bands().gap(f.contact));
   if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
   if (hit || !may_dip(f)) return hit;
   return dips(phase, f);
@@ -342,13 +333,13 @@ bool Watcher::is_hit_between(Phase& phase, Function& f) {
     part.before = part.value;
     part.slope_before = part.slope;
     phase.at(end_, y_);
-    part.value = value_of(part, phase.start() + end_, y_);
+    part.value = value(part, phase.start() + end_, y_);
     if (part.value == kNowhere) return false;
     if (is_hit(phase, part)) {
       f = part;
       return true;
     }
-    part.armed = part.armed || part.value > band(part);
+    if (part.value > band(part)) part.state = State::armed;
   }
   return false;
 }
@@ -362,11 +353,8 @@ std::optional<Zero> Watcher::first_zero(Phase& phase) {
   std::optional<Zero> first;
   undecided_ = {0, kInfinity};
   for (Function& f : functions_) {
-    if (!f.far && f.value == kNowhere) {
-      f.dormant = true;
-      f.armed = false;
-    }
-    if (f.far || f.dormant) continue;
+    if (!f.is(State::far) && f.value == kNowhere) f.state = State::beside;
+    if (f.is(State::far) || f.is(State::beside)) continue;
     Function part = f;
     if (!is_hit_between(phase, part)) {
       begin_ = phase.step_begin();
@@ -378,19 +366,15 @@ std::optional<Zero> Watcher::first_zero(Phase& phase) {
     zero.was_near = f.was_near;
     if (f.what == Watch::gap &&
         motion_.passes_border(phase.start() + zero.time, zero.y, f.contact)) {
-      f.dormant = true;
-      f.armed = false;
+      f.state = State::beside;
       continue;
     }
     if (!first || zero.time < first->time) first = std::move(zero);
   }
   if (first && first->time < undecided_.time) undecided_.tolerance = kInfinity;
   if (!first)
-    for (Function& f : functions_) {
-      if (f.far) continue;
-      f.armed = f.armed || f.value > band(f);
-      f.dormant = f.dormant && !f.armed;
-    }
+    for (Function& f : functions_)
+      if (!f.is(State::far) && f.value > band(f)) f.state = State::armed;
   return first;
 }
 

@@ -45,32 +45,33 @@ class Watcher {
   struct Function {
     Watch what;
     int contact, closed;  // closed: place among the closed contacts
-    bool armed, leaving;
-    bool dormant;  // a gap that is negative beside its feature: no contact
-    bool far;      // a gap of bodies that are far apart: not evaluated
-    bool was_near;
-    double value, before;
-    double slope, slope_before;    // of a gap, m/s, or of a slip, m/s^2
-    double level;                  // from which a gap or a border counts, m
-    double passes, passes_before;  // of a gap, see Model::passes
+    bool leaving, was_near = false;
+    /// far: a gap of bodies that are far apart, not evaluated; beside: a gap that is negative
+    /// beside its feature, no contact; waiting: to leave its band.
+    enum class State { far, beside, waiting, armed } state = State::waiting;
+    double value = 0, before = 0;
+    double slope = 0, slope_before = 0;    // of a gap, m/s, or of a slip, m/s^2
+    double level = 0;                      // from which a gap or a border counts, m
+    double passes = 0, passes_before = 0;  // of a gap, see Model::passes
+
+    bool is(State other) const { return state == other; }
   };
+  using State = Function::State;
   void arm(Function& f);
   void wake(Phase& phase, const VectorXd& at_end, double by);
   void evaluate(double t, const VectorXd& y, double by);
   double way(Phase& phase, const VectorXd& at_end);
-  double value(Function f, double t, const VectorXd& y);
-  double slope(Function f, double t, const VectorXd& y);
-  double value_of(Function& f, double t, const VectorXd& y);
+  double value(Function& f, double t, const VectorXd& y);
   double of_state(Function& f);
   double support();
   double band(const Function& f) const;
-  double lag(Phase& phase, const Function& f, double time);
+  double lag(Phase& phase, Function f, double time);
   bool is_hit(Phase& phase, const Function& f);
   bool is_hit_between(Phase& phase, Function& f);
-  Zero locate(Phase& phase, const Function& f);
+  Zero locate(Phase& phase, Function f);
   bool may_dip(const Function& f) const;
   bool dips(Phase& phase, const Function& f);
-  double turn(Phase& phase, const Function& f, double& when);
+  double turn(Phase& phase, Function f, double& when);
 
   const Bands& bands() const { return motion_.bands(); }
 

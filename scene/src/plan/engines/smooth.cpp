@@ -15,7 +15,7 @@ int smooth_unknowns(const Scene& s, const Plan& plan) {
   const bool works =
       any_of(effects::all(), [&](const effects::Effect* each) { return each->does_work(s); });
   const Formulation form = s.smooth.value_or(SmoothOptions{}).formulation;
-  const int multipliers = form == Formulation::index0 ? 0 : form == Formulation::index1 ? 1 : 2;
+  const int multipliers = form == Formulation::index1 ? 1 : 0;
   return 13 * plan.moving + (keeps_energy && works ? 1 : 0) + multipliers * plan.rows;
 }
 
