@@ -336,6 +336,29 @@ TEST_CASE("a Projection can be moved while IDA holds it") {
   IDAFree(&host.ida);  // before `second` ends
 }
 
+TEST_CASE("calls of a Projection that was moved from are errors") {
+  Host host(swing(), 1e-6);
+  tp::Projection first(host.ida, host.problem.recommended_constraints());
+  const tp::Projection second(std::move(first));
+  const auto refused = [&](auto call) {
+    try {
+      call();
+    } catch (const std::logic_error& error) {
+      return contains(error.what(), "moved from");
+    }
+    return false;
+  };
+  CHECK(refused([&] { (void)first.status(); }));
+  CHECK(refused([&] { (void)first.message(); }));
+  CHECK(refused([&] { (void)first.statistics(); }));
+  CHECK(refused([&] { (void)first.constraints(); }));
+  CHECK(refused([&] { first.reset_statistics(); }));
+  CHECK(refused([&] { first.project(0.0, host.y); }));
+  CHECK(refused([&] { first.make_consistent(0.0, host.y, host.yp); }));
+  CHECK(refused([&] { first.project_gradient(0.0, host.y, host.yp); }));
+  CHECK(second.status() == tp::Status::unused);
+}
+
 TEST_CASE("ida_mem that cannot be attached to is refused, and says why") {
   CHECK(
       contains(thrown([] { const tp::Projection none(nullptr, on_circle()); }), "ida_mem is null"));

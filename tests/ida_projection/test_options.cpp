@@ -86,6 +86,8 @@ TEST_CASE("bad constraints are refused by name") {
   set.count = -1;
   set.names.clear();
   CHECK(contains(refusal({}, set), "constraints.count = -1"));
+  set.count = 100000000;
+  CHECK(contains(refusal({}, set), "constraints.count = 100000000; it must be at most 1000"));
   set = on_circle();
   set.names = {"a", "b"};
   CHECK(contains(refusal({}, set), "names has 2 entries for 1"));

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
 #include <tether/ida_projection/projection.hpp>
@@ -17,14 +18,14 @@
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
+#include "start/consistent_start.hpp"
 #include "start/joined_rows.hpp"
 #include "start/point.hpp"
+#include "step/attempt.hpp"
 #include "step/metric_choice.hpp"
 #include "step/polish.hpp"
 #include "step/step_control.hpp"
-#include "watch/bypass.hpp"
-#include "watch/first_steps.hpp"
-#include "watch/rejections.hpp"
+#include "watch/observer.hpp"
 #include "watch/report.hpp"
 
 namespace tether::ida_projection {
@@ -33,6 +34,14 @@ namespace tether::ida_projection {
 [[noreturn]] void reject(const std::string& text);
 /// Rejects values that cannot work, naming the option, its value and the allowed ones.
 void validate(const Constraints& constraints, const Options& options, N_Vector like);
+
+/// The parts of a Projection, unless it was moved from.
+template <class Pointer>
+auto& own(const Pointer& impl) {
+  if (!impl)
+    throw std::logic_error("Projection: it was moved from; call the one that it was moved to");
+  return *impl;
+}
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
@@ -53,10 +62,15 @@ class Projection::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  // consistency.cpp
+  // projection.cpp: calls of the host
   ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp, const Consistency& how);
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
+  const Constraints& constraints() const { return constraints_; }
+  Status status();
+  const std::string& message();  ///< unchanged by status() and statistics()
+  Statistics statistics();
+  void reset_statistics() { observer_.reset_statistics(); }
 
   // sensitivity/attach.cpp: a program that asks for none links none of it
   void project_sensitivities(Sensitivities given, const tether_idas_functions& idas);
@@ -64,13 +78,7 @@ class Projection::Impl {
                                                   N_Vector* sp);
   ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
 
-  const Constraints& constraints() const { return constraints_; }
-  Status status();
-  const std::string& message();  ///< unchanged by status() and statistics()
-  Statistics statistics();
-  void reset_statistics();
-
-  // The operations of SUNNonlinearSolver that IDA calls (decorator.cpp).
+  // projected_step.cpp: the operations of SUNNonlinearSolver that IDA calls
   int initialize();
   int solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
             bool call_setup, void* mem);
@@ -112,84 +120,30 @@ class Projection::Impl {
     Impl& owner_;
     Busy before_;
   };
-  // The attempt that IDA has not yet judged, and the last step.
-  struct Attempts {
-    long steps = -1, setups = -1;     // IDA's counts at the last attempt
-    bool repeated = false;            // IDA rejected it
-    double moved = infinite;          // tolerances; infinity: no point was found
-    double last_move = 0.0;           // that was found, in tolerances
-    double accepted_move = infinite;  // of the last accepted step
-    Progress progress;                // what the caller is told once it is accepted
-    // Lengths that capped moves lacked, in tolerances: in the last accepted step, and in this
-    // attempt.
-    double left_before = infinite, left = 0.0;
-    double first_move = 0.0;  // of the last attempt at the first step, in tolerances
-    int refused_starts = 0;   // attempts at it with a move that does not shrink
+  struct Moved : Move {
+    Fix fix = Fix::none;  ///< of the polish beside the move
   };
 
   void attach();
-  void check_for_bypass() { watch_.bypass.check(attempts_.steps, run_.initialized, report_); }
-
-  // decorator.cpp: the stages of a projected step
-  int step(Candidate& candidate, double tolerance, bool call_setup);
-  void choose_step(const Candidate& candidate);
-  int correct(const Candidate& candidate, double tolerance, bool call_setup);
-  void begin_move(Candidate& candidate, const StepData& step);
-  void account_for_previous_attempt(const StepData& step);
-  struct Moved : Move {
-    bool corrector_was_right = true;  ///< the polish confirmed its convergence test
-  };
-  Moved move_and_polish(const Candidate& candidate, double cj, double tolerance, bool fresh);
-  void judge_capped(Move& move);
-  bool wants_polish(double length) const { return polish_.wanted(length, control_.smoothing()); }
-  bool polishes_first();
-  bool may_change_metric() const;
-  void account(const Move& move, const StepData& step);
-  int finish(Status outcome, const std::string& text);
-
-  // engage.cpp
-  void find_linear_solver_kind();
-  bool rows_of_field() const;
-  void derive_id(const Candidate& candidate);
-  void leave_out_of_error_test(bool coupled);  ///< `coupled`: variables of index 1 stay in it
-  void test_all_again();
-  std::optional<int> engage_in_trouble(const Candidate& candidate);
-  SetpointFactors setpoint_of_high_index(const Candidate& candidate) const;
-  void begin_run(const Candidate& candidate);
-  void quicken_vectors(const Candidate& candidate);
-  std::optional<int> measure_before_engaging(const Candidate& candidate);
-  Status engage(const Candidate& candidate);
-
-  // doubts.cpp
-  void check_start(const Move& move);
-  void check_rows(const Candidate& candidate, const StepData& step);
-  void keep_point_before(const Candidate& candidate, OwnedVector& y);
-  std::string undetermined_at(const Candidate& candidate, N_Vector y);
-  std::string too_high_index() const;
-  std::string rounding_of_multipliers() const;
-  std::optional<int> watch_rejections(const Candidate& candidate, const StepData& step);
-  int corrector_failed(const Candidate& candidate, int flag);
-
-  // choose_metric.cpp
-  void choose_metric(const Candidate& candidate, Move& move);
-  Move move_by_levels(const Candidate& candidate, bool by_levels);
-  MoveAndResponse try_other_metric(const Candidate& candidate, const MoveAndResponse& present,
-                                   Move& move);
-
-  // consistency.cpp
-  struct Inquiry;
-  void probe(double t0, N_Vector yy, N_Vector yp, Inquiry& inquiry);
-  int answer_inquiry(Candidate& candidate);
-  void find_derivative(double t0, N_Vector y, N_Vector ydot, const Consistency& how);
-  ConsistencyReport project_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                                  bool* jointly);
-  std::optional<ConsistencyReport> move_algebraic_first(double t0, N_Vector start, N_Vector y,
-                                                        N_Vector ydot, const Consistency& how);
-  void settle_start(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
-                    ConsistencyReport& report);
-  void note_changes(ConsistencyReport& report, N_Vector yy, N_Vector y, N_Vector yp,
-                    N_Vector ydot) const;
+  bool engaged() const { return run_.phase == Phase::engaged; }
+  bool bypassed() { return observer_.bypassed(history_.steps(), run_.phase != Phase::late); }
   void current_weights(N_Vector y);
+
+  int step(const Attempt& attempt, const Candidate& candidate, double tolerance, bool call_setup);
+  void begin_run(const Attempt& attempt, const Candidate& candidate);
+  bool in_trouble(const Attempt& attempt, const Candidate& candidate);
+  int correct(const Candidate& candidate, double tolerance, bool call_setup);
+  int corrector_failed(const Candidate& candidate, int flag);
+  bool begin_attempt(const Attempt& attempt, const Candidate& candidate);
+  void find_linear_solver_kind(long steps);
+  Status engage(const Candidate& candidate);
+  void leave_out_of_error_test(bool coupled);
+  Moved move_and_polish(const Candidate& candidate, double tolerance, bool fresh);
+  bool polishes_first() const;
+  bool may_change_metric() const;
+  void judge_capped(Move& move);
+  int hand_over(const Attempt& attempt, const Candidate& candidate, double moved);
+  int finish(Status outcome, const std::string& text);
 
   // Movers of the caller's rows alone (null: there are none), and joined with equations of F.
   struct Movers {
@@ -203,25 +157,21 @@ class Projection::Impl {
     int count = 0;
     OwnedVector weights;  // for points between steps and initial values
   };
-  struct Watches {
-    RowFaults faults;
-    RejectionWatch rejections;
-    FirstSteps first_steps;
-    BypassWatch bypass;
+  enum class Phase {
+    late,      // IDA has not initialised the plugin
+    watching,  // no move was needed yet: the run is that of IDA, bit for bit
+    engaged,   // the policy acts
+    broken     // an exception left things half done: the run cannot go on
   };
   struct Run {
-    bool initialized = false;
-    bool broken = false;            // an exception left things half done: the run cannot go on
+    Phase phase = Phase::late;
     bool suppressed = false;        // IDASetId and IDASetSuppressAlg are this plugin's
-    bool engaged = false;           // the policy acts from the first move that was needed
     std::optional<bool> iterative;  // IDA's linear solver, once it is known
-    OwnedVector start;              // its first y, of contiguous vectors
-    std::string undetermined;       // multipliers at the start, or where correctors fail
-  };
-  // Statistics of the moves.
-  struct Tally {
-    double move_sum = 0.0;
-    long attempts = 0;  // since moves began
+    long setups = -1;               // IDA's count at the last attempt
+    // Lengths in tolerances: of the last move that was found, the last accepted one, and the one
+    // that IDA has to judge (infinity: there was none).
+    double last_move = 0.0, accepted_move = infinite, handed_move = infinite;
+    double left_before = infinite, left = 0.0;  // that capped moves lacked: accepted, and now
   };
 
   Constraints constraints_;
@@ -236,18 +186,17 @@ class Projection::Impl {
   StepControl control_;
   Movers movers_;
   PointProjection point_;
-  Watches watch_;
+  ConsistentStart start_;
+  Observer observer_;
   Owned<SUNNonlinearSolver, SUNNonlinSolFreeEmpty> solver_;  // IDA sees it
   std::unique_ptr<Companion> sensitivities_;
   std::unique_ptr<RowsAt> gradient_;  // of project_gradient()
   Unknowns unknowns_;
   Metric wanted_metric_;
   MetricChoice metric_choice_;
+  History history_;
   Run run_;
-  Inquiry* inquiry_ = nullptr;  // only while make_consistent() probes a start
   Busy busy_ = Busy::no;
-  Attempts attempts_;
-  Tally tally_;
 };
 
 }  // namespace tether::ida_projection

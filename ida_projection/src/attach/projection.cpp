@@ -1,5 +1,7 @@
 // Tether: attaching the projection to IDA. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <new>
+#include <stdexcept>
 #include <tether/ida_projection/projection.hpp>
 
 #include "attach/impl.hpp"
@@ -17,12 +19,6 @@ N_Vector vector_of(void* ida_mem) {
   return y_predicted;
 }
 
-std::unique_ptr<Mover> make_mover(const Constraints& constraints, const Options& options,
-                                  Statistics& statistics, N_Vector like) {
-  if (!has_rows(constraints)) return nullptr;
-  return std::make_unique<Mover>(options, make_rows(constraints, options, statistics, like));
-}
-
 }  // namespace
 
 Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
@@ -36,8 +32,9 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       control_(ida_, options_, statistics_),
       movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
-      watch_{RowFaults(constraints_, statistics_), RejectionWatch(&watch_.faults),
-             FirstSteps(constraints_, watch_.faults), BypassWatch(ida_, lifetime_)},
+      start_(ida_, options_, corrector_, variables_, movers_.joined, point_),
+      observer_(constraints_, options_, statistics_, report_, ida_, lifetime_, corrector_,
+                variables_),
       wanted_metric_(options_.advanced.metric) {
   N_Vector like = vector_of(ida_mem);
   check_running_indices(like);
@@ -45,9 +42,10 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
 
   unknowns_.contiguous = is_contiguous(like);
   unknowns_.count = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
-  movers_.own = make_mover(constraints_, options_, statistics_, like);
-  movers_.used = movers_.own.get();
-  if (movers_.used != nullptr) {
+  if (has_rows(constraints_)) {
+    movers_.own =
+        std::make_unique<Mover>(options_, make_rows(constraints_, options_, statistics_, like));
+    movers_.used = movers_.own.get();
     polish_.allocate(like);
     polish_.allow_forecasts();
     unknowns_.weights = OwnedVector(like);
@@ -81,11 +79,11 @@ void Projection::Impl::attach() {
   require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
   require(SUNNonlinSolSetMaxIters(solver_.get(), corrector_.maximum_iterations()),
           "a number of iterations");
-  if (movers_.used != nullptr) watch_.bypass.begin();
+  if (movers_.used != nullptr) observer_.attached();
   const StepData step = ida_.step();
   lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
     std::string ignored;
-    guarded([this] { return check_for_bypass(), 0; }, ignored);
+    guarded([this] { return bypassed(), 0; }, ignored);
   });
   const int flag = IDASetNonlinearSolver(ida_.mem(), solver_.get());
   if (flag != 0)
@@ -94,19 +92,22 @@ void Projection::Impl::attach() {
 
 Projection::Impl::~Impl() {
   std::string ignored;
-  guarded([this] { return check_for_bypass(), 0; }, ignored);
+  guarded([this] { return bypassed(), 0; }, ignored);
   Operations<Impl>::end(solver_.get(), options_.print);
   lifetime_.free_at_end(solver_.release());
 }
 
 Status Projection::Impl::status() {
-  check_for_bypass();
-  return watch_.bypass.steps() > 0 ? Status::never_called : report_.status_or_warning();
+  return bypassed() ? Status::never_called : report_.status_or_warning();
 }
 
 const std::string& Projection::Impl::message() {
-  check_for_bypass();
-  return watch_.bypass.steps() > 0 ? watch_.bypass.text() : report_.text();
+  return bypassed() ? observer_.bypass_text() : report_.text();
+}
+
+Statistics Projection::Impl::statistics() {
+  bypassed();
+  return observer_.statistics();
 }
 
 std::string Projection::Impl::why_misused(const char* function,
@@ -132,18 +133,77 @@ std::string Projection::Impl::why_unlike_y(N_Vector v) const {
   return {};
 }
 
-Statistics Projection::Impl::statistics() {
-  check_for_bypass();
-  Statistics s = statistics_;
-  s.steps_without_plugin = watch_.bypass.steps();
-  const long moved = s.projections - s.failures();
-  s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
-  return s;
+ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Vector yp,
+                                                    const Consistency& how) {
+  if (yy == nullptr || yp == nullptr) reject("make_consistent: yy and yp must not be null");
+  if (!how.hold.empty() && static_cast<int>(how.hold.size()) != unknowns_.count)
+    reject("make_consistent: hold has " + std::to_string(how.hold.size()) + " entries for " +
+           std::to_string(unknowns_.count) + " unknowns");
+  if (static_cast<int>(how.derivative) < 0 || how.derivative > Consistency::Derivative::keep)
+    reject("make_consistent: derivative = " + std::to_string(static_cast<int>(how.derivative)) +
+           "; it must be one of Consistency::Derivative");
+  ConsistencyReport report;
+  report.status = Status::success;
+  if (!movers_.used) return report;
+  report = start_.make(t0, yy, yp, how, unknowns_.weights, history_.reached());
+  if (report) reset_statistics();
+  if (report.status == Status::internal_error &&
+      run_.phase == Phase::broken) {  // an exception says more
+    report.status = report_.status;
+    report.message = report_.message;
+  }
+  return report;
 }
 
-void Projection::Impl::reset_statistics() {
-  statistics_ = Statistics{};
-  tally_ = Tally();
+ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) {
+  if (yy == nullptr) reject("project: yy must not be null");
+  ConsistencyReport report;
+  report.status = Status::success;
+  if (!movers_.used) return report;
+  current_weights(yy);
+  const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
+  point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
+  const bool turned = report.status == Status::success && ydot &&
+                      point_.tangent(t, y, ydot, variables_.id(), report);
+  if (report.status != Status::success) return report;
+  note_changes(report, unknowns_.weights, yy, y, yp,
+               turned ? static_cast<N_Vector>(ydot) : nullptr);
+  N_VScale(1.0, y, yy);
+  if (turned) N_VScale(1.0, ydot, yp);
+  return report;
+}
+
+// IDA's present error weights; before its first step, weights of relative size.
+void Projection::Impl::current_weights(N_Vector y) {
+  N_Vector weights = unknowns_.weights;
+  if (run_.phase != Phase::late && IDAGetErrWeights(ida_.mem(), weights) == 0) {
+    N_VScale(1.0 / control_.weights_factor(), weights, weights);
+    return;
+  }
+  constexpr double kRelative = 1e6;  // 1 over the tolerance that is taken for the caller's
+  N_VAbs(y, weights);
+  N_VAddConst(weights, 1.0, weights);
+  N_VInv(weights, weights);
+  N_VScale(kRelative, weights, weights);
+}
+
+int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret,
+                                        int itask) {
+  const std::string misused = why_misused("solve", {yret, ypret});
+  if (!misused.empty()) {
+    report_.status = Status::misused;
+    report_.message = misused;
+    return lifetime_.over() ? IDA_MEM_NULL : IDA_ILL_INPUT;
+  }
+  const int flag = IDASolve(ida_.mem(), tout, tret, yret, ypret, itask);
+  if (flag < 0 || !movers_.used || bypassed()) return flag;
+  // A point at the end of a step is projected already, an interpolated one is not.
+  const Status of_step = report_.status;
+  const std::string text = report_.message;
+  if (!report_of("solve", {}, [&] { return project(*tret, yret, ypret); })) return flag;
+  report_.status = of_step;
+  report_.message = text;
+  return flag;
 }
 
 Projection::Projection(void* ida_mem, Constraints constraints, Options options,
@@ -157,20 +217,20 @@ Projection& Projection::operator=(Projection&&) noexcept = default;
 
 ConsistencyReport Projection::make_consistent(double t0, N_Vector yy, N_Vector yp,
                                               const Consistency& how) {
-  return impl_->report_of("make_consistent", {yy, yp},
-                          [&] { return impl_->make_consistent(t0, yy, yp, how); });
+  return own(impl_).report_of("make_consistent", {yy, yp},
+                              [&] { return impl_->make_consistent(t0, yy, yp, how); });
 }
 
 ConsistencyReport Projection::project(double t, N_Vector yy, N_Vector yp) {
-  return impl_->report_of("project", {yy, yp}, [&] { return impl_->project(t, yy, yp); });
+  return own(impl_).report_of("project", {yy, yp}, [&] { return impl_->project(t, yy, yp); });
 }
 int Projection::solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask) {
-  return impl_->solve_and_project(tout, tret, yret, ypret, itask);
+  return own(impl_).solve_and_project(tout, tret, yret, ypret, itask);
 }
-Statistics Projection::statistics() const { return impl_->statistics(); }
-void Projection::reset_statistics() { impl_->reset_statistics(); }
-Status Projection::status() const { return impl_->status(); }
-const std::string& Projection::message() const { return impl_->message(); }
-const Constraints& Projection::constraints() const { return impl_->constraints(); }
+Statistics Projection::statistics() const { return own(impl_).statistics(); }
+void Projection::reset_statistics() { own(impl_).reset_statistics(); }
+Status Projection::status() const { return own(impl_).status(); }
+const std::string& Projection::message() const { return own(impl_).message(); }
+const Constraints& Projection::constraints() const { return own(impl_).constraints(); }
 
 }  // namespace tether::ida_projection

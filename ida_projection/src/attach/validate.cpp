@@ -16,6 +16,9 @@ void reject(const std::string& text) { throw std::invalid_argument("Projection: 
 
 namespace {
 
+// At most one row for each unknown is independent; so many more are a mistake, and take seconds.
+constexpr int kMostRowsEach = 1000;
+
 // The pattern of rows given by their entries.
 template <class Rows>
 void check_pattern(const std::string& kind, const Rows& sparse, int rows, long unknowns,
@@ -29,7 +32,7 @@ void check_pattern(const std::string& kind, const Rows& sparse, int rows, long u
     reject(kind + "::starts goes from " + std::to_string(sparse.starts.front()) + " to " +
            std::to_string(sparse.starts.back()) + "; it must go from 0 to the number of entries, " +
            std::to_string(count));
-  std::vector<int> seen(ascending ? 0 : static_cast<std::size_t>(unknowns), -1);
+  std::vector<int> seen(static_cast<std::size_t>(unknowns), -1);  // the last row with each column
   for (int i = 0; i < rows; ++i) {
     const int begin = sparse.starts[static_cast<std::size_t>(i)];
     const int end = sparse.starts[static_cast<std::size_t>(i) + 1];
@@ -39,11 +42,10 @@ void check_pattern(const std::string& kind, const Rows& sparse, int rows, long u
     for (int e = begin; e < end; ++e) {
       const int j = sparse.columns[static_cast<std::size_t>(e)];
       const bool outside = j < 0 || j >= unknowns;
-      const auto orderly = [&] {
-        if (ascending) return e == begin || j > sparse.columns[static_cast<std::size_t>(e) - 1];
-        return std::exchange(seen[static_cast<std::size_t>(j)], i) != i;
-      };
-      if (!outside && orderly()) continue;
+      const bool descends =
+          ascending && e > begin && j < sparse.columns[static_cast<std::size_t>(e) - 1];
+      if (!outside && !descends && std::exchange(seen[static_cast<std::size_t>(j)], i) != i)
+        continue;
       const std::string where = kind + "::columns[" + std::to_string(e) +
                                 "] = " + std::to_string(j) + " in row " + std::to_string(i);
       if (outside) reject(where + "; it must be 0 .. " + std::to_string(unknowns - 1));
@@ -83,6 +85,10 @@ void check_distributed(const DistributedRows& given, int rows, N_Vector like) {
 void check_rows(const Constraints& set, long unknowns, N_Vector like) {
   if (set.count < 0)
     reject("constraints.count = " + std::to_string(set.count) + "; it must be >= 0");
+  if (unknowns > 0 && set.count / kMostRowsEach > unknowns)
+    reject("constraints.count = " + std::to_string(set.count) + "; it must be at most " +
+           std::to_string(kMostRowsEach) + " for each of the " + std::to_string(unknowns) +
+           " unknowns");
   if (!set.names.empty() && static_cast<int>(set.names.size()) != set.count)
     reject("constraints.names has " + std::to_string(set.names.size()) + " entries for " +
            std::to_string(set.count) + " rows; give one for each row, or none");

@@ -204,13 +204,6 @@ class ReverseIda::Implementation {
     bool waiting = false;  // it is done
   };
 
-  const Question& asked() const { return asked_; }
-  const Task& task() const { return task_; }
-  double t() const { return t_; }
-  void* mem() const { return mem_.get(); }
-  const tp::Projection* projection() const { return projection_ ? &*projection_ : nullptr; }
-
- private:
   N_Vector vector(const std::vector<double>& values) const {
     const N_Vector made_here =
         made(N_VNew_Serial(static_cast<sunindextype>(values.size()), context_.get()));
@@ -387,19 +380,19 @@ Request ReverseIda::solve(double tout, bool one_step) {
 }
 Request ReverseIda::make_consistent() { return implementation_->make_consistent(); }
 Request ReverseIda::go_on(int answer) { return implementation_->go_on(answer); }
-Request ReverseIda::request() const { return implementation_->asked().request; }
-double ReverseIda::t() const { return implementation_->t(); }
-double ReverseIda::cj() const { return implementation_->asked().cj; }
-const double* ReverseIda::y() const { return implementation_->asked().y; }
-const double* ReverseIda::yp() const { return implementation_->asked().yp; }
-const double* ReverseIda::rhs() const { return implementation_->asked().rhs; }
-double* ReverseIda::result() const { return implementation_->asked().result; }
-std::size_t ReverseIda::result_size() const { return implementation_->asked().result_size; }
-int ReverseIda::flag() const { return implementation_->task().flag; }
-std::string ReverseIda::message() const { return implementation_->task().message; }
-void* ReverseIda::ida_mem() const { return implementation_->mem(); }
+Request ReverseIda::request() const { return implementation_->asked_.request; }
+double ReverseIda::t() const { return implementation_->t_; }
+double ReverseIda::cj() const { return implementation_->asked_.cj; }
+const double* ReverseIda::y() const { return implementation_->asked_.y; }
+const double* ReverseIda::yp() const { return implementation_->asked_.yp; }
+const double* ReverseIda::rhs() const { return implementation_->asked_.rhs; }
+double* ReverseIda::result() const { return implementation_->asked_.result; }
+std::size_t ReverseIda::result_size() const { return implementation_->asked_.result_size; }
+int ReverseIda::flag() const { return implementation_->task_.flag; }
+std::string ReverseIda::message() const { return implementation_->task_.message; }
+void* ReverseIda::ida_mem() const { return implementation_->mem_.get(); }
 const ida_projection::Projection* ReverseIda::projection() const {
-  return implementation_->projection();
+  return implementation_->projection_ ? &*implementation_->projection_ : nullptr;
 }
 
 }  // namespace tether::reverse_ida

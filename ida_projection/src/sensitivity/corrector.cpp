@@ -179,10 +179,9 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   rows_->report.fatal = false;
   accept();
   Status status = evaluate(step);
-  Fix fix;
+  Fix fix = Fix::none;
   if (status == Status::success) status = move_and_polish(candidate, step, tolerance, fix);
-  if (status == Status::success && !fix.corrector_was_right && !call_setup &&
-      corrector_->has_setup()) {
+  if (status == Status::success && fix == Fix::misled && !call_setup && corrector_->has_setup()) {
     // As for the state: a stale Jacobian fooled IDAS' convergence test.
     N_VConst(0.0, correction);
     flag = corrector_->correct(candidate, tolerance, true, none);
@@ -247,7 +246,7 @@ void SensitivityCorrector::note_setups(double cj) {
 Status SensitivityCorrector::evaluate(const StepData& step) {
   y_ = step.y;
   IDAGetErrWeights(state_.ida_.mem(), weights_);
-  N_Vector id = state_.run_.engaged ? state_.movers_.joined.moved_id() : nullptr;
+  N_Vector id = state_.engaged() ? state_.movers_.joined.moved_id() : nullptr;
   return rows_->linearise(step.t, y_, weights_, id);
 }
 
@@ -338,7 +337,7 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
   ++state_.statistics_.sensitivity_projections;
   if (!polish_->wanted(length, false)) return Status::success;
   fix = polish_->add_newton_step(candidate, step.cj, tolerance, true);
-  if (!fix.made) return Status::success;
+  if (fix == Fix::none) return Status::success;
   status = find_moves(candidate, step.t, false, &length);
   if (status == Status::success) apply(candidate);
   return status;

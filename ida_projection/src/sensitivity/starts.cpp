@@ -30,16 +30,17 @@ double largest(const std::vector<double>& values) {
 
 void Projection::project_sensitivities(Sensitivities sensitivities,
                                        const tether_idas_functions& idas) {
-  impl_->project_sensitivities(std::move(sensitivities), idas);
+  own(impl_).project_sensitivities(std::move(sensitivities), idas);
 }
 ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
                                                             N_Vector* s, N_Vector* sp) {
-  return impl_->report_of("make_sensitivities_consistent", {yy, yp},
-                          [&] { return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp); });
+  return own(impl_).report_of("make_sensitivities_consistent", {yy, yp}, [&] {
+    return impl_->make_sensitivities_consistent(t0, yy, yp, s, sp);
+  });
 }
 ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v) {
-  return impl_->report_of("project_gradient", {yy, v},
-                          [&] { return impl_->project_gradient(t, yy, v); });
+  return own(impl_).report_of("project_gradient", {yy, v},
+                              [&] { return impl_->project_gradient(t, yy, v); });
 }
 
 void Projection::Impl::project_sensitivities(Sensitivities given,

@@ -11,19 +11,16 @@ namespace tether::ida_projection {
 // F(t, y, y'_pred), N values, through IDA's own callback: ypred is replaced for the call.
 bool JoinedRows::residual_at(const double* y, double* f) {
   if (!none_) {
-    none_ = OwnedVector(present_.base);
-    f_ = OwnedVector(present_.base);
-    kept_ = OwnedVector(present_.base);
+    for (OwnedVector* each : {&none_, &f_, &kept_}) *each = OwnedVector(present_.base);
     N_VConst(0.0, none_);
   }
-  const auto size = static_cast<std::ptrdiff_t>(N_VGetLength(present_.base));
+  const auto size = static_cast<std::size_t>(N_VGetLength(present_.base));
   N_VScale(1.0, present_.base, kept_);
-  std::copy(y, y + size, present_.base_entries);
+  std::copy_n(y, size, present_.base_entries);
   ++statistics_.residual_evaluations;
   const bool evaluated = corrector_.residual(none_, f_) == 0;
   N_VScale(1.0, kept_, present_.base);
-  const double* values = N_VGetArrayPointer(f_);
-  std::copy(values, values + size, f);
+  std::copy_n(N_VGetArrayPointer(f_), size, f);
   return evaluated;
 }
 
@@ -32,8 +29,9 @@ void JoinedRows::forget() {
   moved_id_ = OwnedVector();
 }
 
-void JoinedRows::join(const Candidate& candidate, double cj) {
+void JoinedRows::join(const Candidate& candidate) {
   forget();  // what a failed attempt has left
+  begin(candidate);
   if (candidate.base_entries == nullptr || !variables_.any() || !has_values(constraints_)) return;
   const auto size = static_cast<int>(N_VGetLength(candidate.base));
   if (size > kLargestProbed) return;
@@ -47,9 +45,8 @@ void JoinedRows::join(const Candidate& candidate, double cj) {
   const Residual residual = [this](const double* at, double* f) { return residual_at(at, f); };
   const double* id = variables_.mask();
   const JoinedEquations found = find_joined_equations(
-      rows, residual,
-      [&] { return variables_.derivative_free_equations(candidate, corrector_, cj); }, candidate.t,
-      y, WT, options_.hold, id, variables_.index_known() && !variables_.high_index());
+      rows, residual, [&] { return variables_.derivative_free_equations(candidate, corrector_); },
+      candidate.t, y, WT, options_.hold, id, variables_.index_known() && !variables_.high_index());
   if (rows.report.fatal) corrector_.stop(-1, rows.report.text);
   if (found.moves.empty()) return;
   moved_id_ = OwnedVector(candidate.base);

@@ -25,7 +25,7 @@ class JoinedRows {
   /// F is evaluated and weighed as in the attempt at this candidate.
   void begin(const Candidate& present) { present_ = present; }
   /// Looks for such equations at the candidate.
-  void join(const Candidate& candidate, double cj);
+  void join(const Candidate& candidate);
   void forget();
   /// Evaluates F at the present candidate, so that IDA's y and y' are those of the attempt again:
   /// the joined equations evaluate F elsewhere.

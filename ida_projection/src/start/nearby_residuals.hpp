@@ -3,7 +3,9 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <optional>
 #include <tether/ida_projection/statistics.hpp>
+#include <utility>
 #include <vector>
 
 #include "host/corrector.hpp"
@@ -18,56 +20,60 @@ class NearbyResiduals {
  public:
   enum class Of { values, rates };
 
-  /// y_j changes by change[j], y'_j by cj change[j]; `around`: y, `change` rounding aside. One
-  /// evaluation of F here, and one in each call.
+  /// y_j changes by change[j], y'_j by cj change[j], around y (null: the prediction), whose values
+  /// are rounded to fit. One evaluation of F here, and one in each call.
   NearbyResiduals(const Candidate& candidate, Corrector& corrector, Statistics& statistics,
-                  std::vector<double> change, N_Vector around)
+                  std::vector<double> change, N_Vector around = nullptr)
       : candidate_(candidate),
         corrector_(corrector),
         statistics_(statistics),
         change_(std::move(change)),
         low_(change_.size()),
-        before_(change_.size()),
         saved_(candidate.base),
         ycor_(candidate.base),
         f_(candidate.base) {
-    const double* y = N_VGetArrayPointer(around);
+    const double* y = N_VGetArrayPointer(around != nullptr ? around : candidate.base);
     for (std::size_t j = 0; j < low_.size(); ++j) low_[j] = y[j] - change_[j];
     N_VConst(0.0, ycor_);
-    known_ = evaluate({}, Of::values);
-    const double* f = N_VGetArrayPointer(f_);
-    before_.assign(f, f + before_.size());
+    if (evaluate({}, Of::values)) before_ = f();
   }
-  NearbyResiduals(const Candidate& candidate, Corrector& corrector, Statistics& statistics,
-                  std::vector<double> change)
-      : NearbyResiduals(candidate, corrector, statistics, std::move(change), candidate.base) {}
 
-  /// Could F be evaluated at the point itself?
-  bool known() const { return known_; }
+  /// Whether F can be evaluated at the point itself.
+  bool known() const { return before_.has_value(); }
   /// Sets noticed[i] to 1 where F_i differs, bit for bit, once all of these components are changed.
   /// False: F cannot be evaluated there.
   bool notices(const std::vector<int>& components, Of what, std::vector<char>& noticed) {
-    if (!known_ || !evaluate(components, what)) return false;
-    const double* f = N_VGetArrayPointer(f_);
-    for (std::size_t i = 0; i < before_.size(); ++i) noticed[i] |= !(f[i] == before_[i]);
+    if (!known() || !evaluate(components, what)) return false;
+    for (std::size_t i = 0; i < noticed.size(); ++i)
+      noticed[i] |=
+          !(f()[static_cast<Eigen::Index>(i)] == (*before_)[static_cast<Eigen::Index>(i)]);
     return true;
   }
   /// The change of F by that of one component, over change[j].
   bool slope(int component, Of what, Eigen::Ref<Eigen::VectorXd> slope) {
-    if (!known_ || !evaluate({component}, what)) return false;
-    const auto n = static_cast<Eigen::Index>(before_.size());
-    slope = (Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(f_), n) -
-             Eigen::Map<const Eigen::VectorXd>(before_.data(), n)) /
-            change_[static_cast<std::size_t>(component)];
+    if (!known() || !evaluate({component}, what)) return false;
+    slope = (f() - *before_) / change_[static_cast<std::size_t>(component)];
     return true;
   }
 
   /// Changes of about `size` tolerances, large enough for y' to change in the last bit. They vary
   /// irregularly with j, so that those of one equation do not cancel.
-  static std::vector<double> irregular_changes(const Candidate& candidate, double cj, double size,
-                                               double turn = 2.3);
+  static std::vector<double> irregular_changes(const Candidate& candidate, double size,
+                                               double turn = 2.3) {
+    std::vector<double> change(static_cast<std::size_t>(N_VGetLength(candidate.base)));
+    for (std::size_t j = 0; j < change.size(); ++j) {
+      const double w = candidate.weight_entries[j];
+      const double irregular = 1.5 + 0.5 * std::sin(1.0 + turn * static_cast<double>(j));
+      change[j] =
+          size * irregular * std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(candidate.cj));
+    }
+    return change;
+  }
 
  private:
+  Eigen::Map<const Eigen::VectorXd> f() const {
+    return {N_VGetArrayPointer(f_), static_cast<Eigen::Index>(change_.size())};
+  }
   bool evaluate(const std::vector<int>& components, Of what) {
     double* const base = candidate_.base_entries;
     N_VScale(1.0, candidate_.base, saved_);
@@ -91,20 +97,9 @@ class NearbyResiduals {
   const Candidate& candidate_;
   Corrector& corrector_;
   Statistics& statistics_;
-  std::vector<double> change_, low_, before_;
+  std::vector<double> change_, low_;
   OwnedVector saved_, ycor_, f_;
-  bool known_ = false;
+  std::optional<Eigen::VectorXd> before_;  // F at the point; empty: it cannot be evaluated
 };
-
-inline std::vector<double> NearbyResiduals::irregular_changes(const Candidate& candidate, double cj,
-                                                              double size, double turn) {
-  std::vector<double> change(static_cast<std::size_t>(N_VGetLength(candidate.base)));
-  for (std::size_t j = 0; j < change.size(); ++j) {
-    const double w = candidate.weight_entries[j];
-    const double irregular = 1.5 + 0.5 * std::sin(1.0 + turn * static_cast<double>(j));
-    change[j] = size * irregular * std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(cj));
-  }
-  return change;
-}
 
 }  // namespace tether::ida_projection

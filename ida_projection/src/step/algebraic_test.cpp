@@ -16,7 +16,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "host/rounding.hpp"
 
 namespace tether::ida_projection {
 
@@ -26,9 +27,9 @@ namespace {
 // neither the steps of forms of index 1 nor the roots of titrations; from 1e4 on some titrations
 // end at another root.
 constexpr double kOfNoise = 1e3;
-constexpr double kRounding = 1e3 * std::numeric_limits<double>::epsilon();  // of y_a, by F and J
-constexpr double kMemory = 0.9;  // per step: S changes slowly
-constexpr double kStays = 0.5;   // of the first error; an error that h determines falls below 1/16
+constexpr double kRounding = 1e3 * kEpsilon;  // of y_a, by F and J
+constexpr double kMemory = 0.9;               // per step: S changes slowly
+constexpr double kStays = 0.5;  // of the first error; an error that h determines falls below 1/16
 // Steps shorter by this factor, in which y_a still jumps, meet a jump of F. The fronts of
 // titrations are far wider.
 constexpr double kAtOnce = 1e-6;
@@ -45,59 +46,52 @@ double noise_in_test(int order) {
 }  // namespace
 
 void AlgebraicTest::begin(const std::vector<int>& variables) {
-  variables_.clear();
-  for (const int j : variables) variables_.push_back({j, 0.0, 0.0});
-  steps_ = -1;
-  accepted_ = 0;
-  refused_h_ = 0.0;
-  jump_ = false;
+  *this = AlgebraicTest();
+  for (const int j : variables) variables_.push_back({j});
 }
 
-// Called for another attempt at a step whose last attempt was rejected.
-void AlgebraicTest::detect_jump(double h, long steps) {
-  accepted_ = steps != steps_ ? accepted_ + 1 : 0;
+// For another attempt at a step whose last attempt was rejected.
+void AlgebraicTest::detect_jump(const Attempt& attempt) {
+  accepted_ = attempt.accepted || last_.h == 0.0 ? accepted_ + 1 : 0;
   if (accepted_ > kBeyond) {
-    refused_h_ = 0.0;
+    refused_ = {};
     jump_ = false;
-  } else if (accepted_ == 0 && refused_h_ == 0.0) {
-    refused_h_ = h_;
-    refused_error_ = error_;
-  } else if (accepted_ == 0 && h < kAtOnce * refused_h_ && error_ > kStays * refused_error_) {
+  } else if (accepted_ == 0 && refused_.h == 0.0) {
+    refused_ = last_;
+  } else if (accepted_ == 0 && std::abs(attempt.h) < kAtOnce * refused_.h &&
+             last_.error > kStays * refused_.error) {
     jump_ = true;
   }
 }
 
 // Rounding makes independent errors, too.
 double AlgebraicTest::widened(const Variable& v, double weight, double y) const {
-  const double error = v.response * move_ + std::numeric_limits<double>::epsilon() * std::abs(y);
+  const double error = v.response * move_ + kEpsilon * std::abs(y);
   return weight / (1.0 + weight * noise_ * error);
 }
 
-void AlgebraicTest::begin_attempt(const Candidate& candidate, double move, int order, double h,
-                                  long steps) {
-  detect_jump(h, steps);
-  h_ = h;
-  if (steps != steps_)
-    for (Variable& v : variables_) v.response *= kMemory;
-  order_ = order;
+bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candidate, double move) {
+  detect_jump(attempt);
+  const bool first = last_.h == 0.0;
   move_ = move;
-  noise_ = kOfNoise * noise_in_test(order);
+  noise_ = kOfNoise * noise_in_test(attempt.order);
   double sum = 0.0;
-  for (const Variable& v : variables_) {
+  for (Variable& v : variables_) {
+    if (attempt.accepted) v.response *= kMemory;
     const double weight =
         widened(v, candidate.weight_entries[v.index], candidate.base_entries[v.index]);
     const double error = candidate.correction_entries[v.index] * weight;
     sum += error * error;
   }
-  error_ = std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights))) / (order + 1);
-  if (steps_ < 0) first_error_ = error_;
-  steps_ = steps;
+  const double error =
+      std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights))) / (attempt.order + 1);
+  last_ = {std::abs(attempt.h), error};
+  if (first) first_error_ = error;
+  // IDA doubles h where twice the error is at most 2^-(k+1).
+  return error > std::ldexp(1.0, -(attempt.order + 2));
 }
 
-// IDA doubles h where twice the error is at most 2^-(k+1).
-bool AlgebraicTest::limit_step() const { return error_ > std::ldexp(1.0, -(order_ + 2)); }
-
-bool AlgebraicTest::stay() const { return error_ > kStays * first_error_; }
+bool AlgebraicTest::stay() const { return last_.error > kStays * first_error_; }
 
 void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
   double* weights = N_VGetArrayPointer(candidate.weights);
@@ -111,8 +105,8 @@ void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
   }
 }
 
-void AlgebraicTest::restore(N_Vector weights, long steps) const {
-  if (steps != steps_ || variables_.empty()) return;
+void AlgebraicTest::restore(N_Vector weights) const {
+  if (last_.h == 0.0 || variables_.empty()) return;
   double* entries = N_VGetArrayPointer(weights);
   for (const Variable& v : variables_) entries[v.index] = v.weight;
 }

@@ -1,6 +1,9 @@
 // Tether: which metric moves are made in. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "movers/mover.hpp"
+#include "step/polish.hpp"
+
 namespace tether::ida_projection {
 
 /// A move and the response of F to it over the differential variables, in tolerances.
@@ -50,6 +53,10 @@ class MetricChoice {
     next_wait_ *= 2;
   }
   bool by_levels() const { return by_levels_; }  ///< the present metric
+  /// After a successful move: that one, or the one that takes its place. `high_index`: F is of
+  /// index 2 or more.
+  Move improved(const Candidate& candidate, Move move, Mover& mover, Polish& polish,
+                bool high_index);
 
  private:
   static constexpr int kPause = 8;       // moves

@@ -3,21 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ida/ida.h>
-#include <utility>
-
-#include "step/step_smoothing.hpp"
 
 namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6;  // of r: 0.7, 0.55
-constexpr double kLogSmall = -1.2;                            // 0.3
-constexpr int kSamples = 6;                                   // in the mean of log r
-constexpr double kWorth = 0.5;                                // of the step before it
-constexpr long kFirstSteps = 60;                              // a start excites what is stiff
-constexpr long kWait = 100;  // steps, after a limit that did not pay
+constexpr int kLimit = 2;   // the highest order that damps
+constexpr long kEvery = 4;  // steps, between two samples of r
+constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6,
+                 kLogSmall = -1.2;  // of r: 0.7, 0.55, 0.3
+constexpr long kFirstSteps = 60;    // a start excites what is stiff
+constexpr int kSamples = 6;         // in the mean of log r
+constexpr double kWorth = 0.5;      // of the step before it
+constexpr long kWait = 100;         // steps, after a limit that did not pay
 constexpr int kTries = 8;
 constexpr double kPassed = 0.8;        // |ycor| / (k + 1), where IDA's test is not asked
 constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
@@ -27,112 +25,118 @@ constexpr double kUnderflow = 1e-200;  // its square, times any weight, is 0
 void OrderLimit::reset() {
   end();
   now_ = State();
-  now_.on = options_.advanced.limit_order;
+  if (options_.advanced.limit_order) now_.phase = Phase::watching;
 }
 
 void OrderLimit::end() {
-  if (now_.phase == Phase::lowering) hold_step(false);
-  if (now_.phase == Phase::limited) IDASetMaxOrd(ida_mem_, now_.highest);
-  now_.phase = Phase::watching;
-  now_.on = false;
+  if (lowering()) settings_.set({});
+  if (now_.phase == Phase::limited) settings_.limit_order(now_.highest);
+  now_.phase = Phase::off;
 }
 
-void OrderLimit::note_differences(long steps, double ycor, double curvature) {
-  int order = 1;
-  IDAGetCurrentOrder(ida_mem_, &order);
-  now_.pending_steps = -1;
-  if (order < (now_.phase == Phase::limited || at_start(steps) ? kLimit : 3)) return;
-  if (!(ycor > 0.0) || !(curvature > 0.0)) return;
-  now_.pending = std::log(ycor / curvature) / (order - 1);
-  now_.pending_steps = steps;
-}
-
-// The mean of the latest log r: each new one replaces a mean one.
-void OrderLimit::take_sample(long steps) {
-  if (now_.pending_steps < 0 || steps <= now_.pending_steps) return;
-  now_.pending_steps = -1;
-  now_.samples = std::min(now_.samples + 1, kSamples);
-  now_.mean =
-      now_.samples == 1 ? now_.pending : now_.mean + (now_.pending - now_.mean) / now_.samples;
-}
-
-double OrderLimit::control(long steps, double t, double norm) {
-  if (!now_.on) return 1.0;
-  int order = 1;
-  IDAGetCurrentOrder(ida_mem_, &order);
-  now_.highest = std::max(now_.highest, order);
-  if (now_.phase == Phase::lowering) return lower(order, steps, t, norm);
-  take_sample(steps);
+Control OrderLimit::control(const Attempt& attempt, const Candidate& candidate, N_Vector tested,
+                            N_Vector differential) {
+  if (now_.phase == Phase::off) return {};
+  compare_slopes(attempt, candidate, differential);
+  now_.highest = std::max(now_.highest, attempt.order);
+  if (lowering())
+    return lower(attempt, error_norm(candidate.correction, candidate.weights, tested));
   if (now_.phase == Phase::watching)
-    watch(steps, order);
+    watch(attempt);
   else
-    judge(steps, t);
-  return 1.0;
+    judge(attempt);
+  return {};
+}
+
+// Compares y' of two successive steps, now and then. The mean of the latest log r: each new one
+// replaces a mean one.
+void OrderLimit::compare_slopes(const Attempt& attempt, const Candidate& candidate,
+                                N_Vector differential) {
+  if (now_.pending && attempt.accepted && !lowering()) {
+    now_.samples = std::min(now_.samples + 1, kSamples);
+    now_.mean =
+        now_.samples == 1 ? *now_.pending : now_.mean + (*now_.pending - now_.mean) / now_.samples;
+    now_.pending.reset();
+  }
+  const bool keeps = attempt.steps % kEvery == 0;
+  if (!keeps && !(kept_slope_ && attempt.steps % kEvery == 1)) return;
+  if (!kept_slope_)
+    for (OwnedVector* each : {&kept_slope_, &slope_}) *each = OwnedVector(candidate.base);
+  N_VLinearSum(1.0, attempt.yp_predicted, attempt.cj, candidate.correction,
+               keeps ? kept_slope_ : slope_);
+  if (keeps) return;
+  now_.pending.reset();
+  const bool low = now_.phase == Phase::limited || at_start(attempt.steps);
+  if (attempt.order < (low ? kLimit : kLimit + 1)) return;
+  N_VLinearSum(1.0, slope_, -1.0, kept_slope_, slope_);
+  const double ycor = error_norm(candidate.correction, candidate.weights, differential);
+  const double curvature = attempt.h * error_norm(slope_, candidate.weights, differential);
+  if (ycor > 0.0 && curvature > 0.0)
+    now_.pending = std::log(ycor / curvature) / (attempt.order - 1);
 }
 
 // A start excites what is stiff; orders 3 and 4, which IDA has after a few steps, keep that up.
 bool OrderLimit::at_start(long steps) const {
-  return now_.stiff && steps < kFirstSteps && now_.begun == (now_.acted_early ? 1 : 0);
+  return now_.start != Start::calm && steps < kFirstSteps && now_.limits == 0;
 }
 
-void OrderLimit::watch(long steps, int order) {
-  if (order <= kLimit) return;
-  const double large = now_.stiff ? kLogLargeIfStiff : kLogLarge;
-  now_.early = at_start(steps) && (now_.samples == 0 || now_.mean > large);
-  const bool seen = now_.samples == kSamples && now_.mean >= large && steps >= now_.not_before;
-  if (!now_.early && !seen) return;
-  if (!now_.early || !std::exchange(now_.acted_early, true)) ++now_.begun;
-  if (!now_.early) now_.samples = 0;
-  now_.phase = Phase::lowering;
+void OrderLimit::watch(const Attempt& attempt) {
+  if (attempt.order <= kLimit) return;
+  const double large = now_.start == Start::calm ? kLogLarge : kLogLargeIfStiff;
+  if (at_start(attempt.steps) && (now_.samples == 0 || now_.mean > large)) {
+    now_.start = Start::lowered;
+    now_.phase = Phase::lowering_at_start;
+  } else if (now_.samples == kSamples && now_.mean >= large && attempt.steps >= now_.not_before) {
+    ++now_.limits;
+    now_.samples = 0;
+    now_.phase = Phase::lowering;
+  } else {
+    return;
+  }
   now_.tries = 0;
-  IDAGetCurrentStep(ida_mem_, &now_.step_before);
+  now_.step_before = attempt.h;
 }
 
 // IDA lowers its order by one where that makes the estimated error no larger: weights that
 // underflow make all estimates 0. Only where the error test would be passed: it is not made then.
-double OrderLimit::lower(int order, long steps, double t, double norm) {
-  if (order <= kLimit) {
-    hold_step(false);
-    now_.phase = now_.early ? Phase::watching : Phase::limited;
-    if (now_.early) return 1.0;
-    // IDA never raises the order beyond a limit that it has reached.
-    IDASetMaxOrd(ida_mem_, kLimit);
-    now_.since = steps;
-    now_.t_since = t;
-    now_.pending_steps = -1;
-    return 1.0;
+Control OrderLimit::lower(const Attempt& attempt, double norm) {
+  if (attempt.order <= kLimit) {
+    if (now_.phase == Phase::lowering_at_start) return now_.phase = Phase::watching, Control();
+    now_.phase = Phase::limited;
+    settings_.limit_order(kLimit);  // IDA never raises the order beyond a limit that it has reached
+    now_.since = attempt.steps;
+    now_.t_since = attempt.t;
+    now_.pending.reset();
+    return {};
   }
   if (now_.tries >= kTries) {  // something else, such as sensitivities, is in the error test
     end();
-    return 1.0;
+    return {};
   }
-  const bool passed = norm / (order + 1) <= kPassed;
-  hold_step(passed);
-  if (passed) ++now_.tries;
-  return passed ? kUnderflow : 1.0;
+  if (norm / (attempt.order + 1) > kPassed) return {};
+  ++now_.tries;
+  return {{1.0, kAnyRatio}, kUnderflow};
 }
 
 // Steps that became shorter tell that the limit does not pay; a vibration that a higher order
 // excites grows, however long its steps are.
-void OrderLimit::judge(long steps, double t) {
-  const long taken = steps - now_.since;
+void OrderLimit::judge(const Attempt& attempt) {
+  const long taken = attempt.steps - now_.since;
   if (taken != now_.trial) return;
-  const double mean = std::abs(t - now_.t_since) / static_cast<double>(taken);
+  const double mean = std::abs(attempt.t - now_.t_since) / static_cast<double>(taken);
   const bool shorter = mean < kWorth * std::abs(now_.step_before);
   const bool pays_no_more = now_.samples == kSamples && now_.mean < kLogSmall;
-  now_.since = steps;
-  now_.t_since = t;
+  now_.since = attempt.steps;
+  now_.t_since = attempt.t;
   if (!shorter && !pays_no_more) return;
-  IDASetMaxOrd(ida_mem_, now_.highest);
+  settings_.limit_order(now_.highest);
   now_.phase = Phase::watching;
   now_.samples = 0;
-  now_.pending_steps = -1;
-  if (shorter) now_.not_before = steps + kWait;
-  if (!shorter) now_.trial *= 2;
-}
-
-void OrderLimit::hold_step(bool hold) {
-  IDASetEtaFixedStepBounds(ida_mem_, 1.0, hold ? kAnyRatio : 2.0);
+  now_.pending.reset();
+  if (shorter)
+    now_.not_before = attempt.steps + kWait;
+  else
+    now_.trial *= 2;
 }
 
 }  // namespace tether::ida_projection

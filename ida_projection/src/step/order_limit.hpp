@@ -2,7 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <tether/ida_projection/options.hpp>
+
+#include "host/candidate.hpp"
+#include "host/owned_vector.hpp"
+#include "step/attempt.hpp"
+#include "step/ida_settings.hpp"
 
 namespace tether::ida_projection {
 
@@ -25,61 +31,56 @@ namespace tether::ida_projection {
 /// steps.
 class OrderLimit {
  public:
-  OrderLimit(void* ida_mem, const Options& options) : ida_mem_(ida_mem), options_(options) {}
+  OrderLimit(IdaSettings& settings, const Options& options)
+      : settings_(settings), options_(options) {}
 
   /// Stiff components have responded to moves: oscillations are likely, and expected at smaller r.
-  void expect_oscillations() { now_.stiff = true; }
+  void expect_oscillations() {
+    if (now_.start == Start::calm) now_.start = Start::stiff;
+  }
   /// Before the first step.
   void reset();
   /// No limit for the rest of the run.
   void end();
-  /// Whether y' of this attempt is kept, as that of the first of two steps in a row, or compared,
-  /// as that of the second. `steps`: accepted before it.
-  bool keeps_slope(long steps) const { return now_.on && steps % kEvery == 0; }
-  bool compares_slopes(long steps) const { return now_.on && steps % kEvery == 1; }
-  /// For such a second attempt: |ycor| and |h (y'_n - y'_{n-1})| in the norm of IDA's error test.
-  void note_differences(long steps, double ycor, double curvature);
-  /// At the end of each successful solve at time t. Returns by how much IDA's error weights are to
-  /// be multiplied for the rest of this attempt; 1: left alone.
-  double control(long steps, double t, double norm);
-
-  bool lowering() const { return now_.phase == Phase::lowering; }
-  long begun() const { return now_.begun; }
+  /// At the end of each successful solve. `tested`, `differential`: the variables of IDA's error
+  /// test, and those whose oscillations count; null: all.
+  Control control(const Attempt& attempt, const Candidate& candidate, N_Vector tested,
+                  N_Vector differential);
+  long begun() const { return now_.limits + (now_.start == Start::lowered ? 1 : 0); }
 
  private:
-  static constexpr int kLimit = 2;
-  static constexpr long kEvery = 4;
-  enum class Phase { watching, lowering, limited };
+  enum class Phase { off, watching, lowering_at_start, lowering, limited };
+  enum class Start { calm, stiff, lowered };  // lowered: stiff, and the order was lowered early
 
-  void take_sample(long steps);
+  void compare_slopes(const Attempt& attempt, const Candidate& candidate, N_Vector differential);
+  void watch(const Attempt& attempt);
   bool at_start(long steps) const;
-  void watch(long steps, int order);
-  double lower(int order, long steps, double t, double norm);
-  void judge(long steps, double t);
-  void hold_step(bool hold);
+  bool lowering() const {
+    return now_.phase == Phase::lowering || now_.phase == Phase::lowering_at_start;
+  }
+  Control lower(const Attempt& attempt, double norm);
+  void judge(const Attempt& attempt);
 
   // From a new run on.
   struct State {
-    bool on = false, stiff = false;
-    Phase phase = Phase::watching;
-    long begun = 0;
-    // of the differences
-    double pending = 0.0;  // log r of an attempt that IDA has not yet judged
-    long pending_steps = -1;
+    Phase phase = Phase::off;
+    Start start = Start::calm;
+    long limits = 0;
+    std::optional<double> pending;  // log r of an attempt that IDA has not yet judged
     int samples = 0;
     double mean = 0.0;  // of log r
     int tries = 0, highest = 0;
-    bool early = false, acted_early = false;  // lowering in the first steps: now, ever
-    double step_before = 0.0;                 // the limit
-    long since = 0;                           // steps when it was judged last
-    long trial = 40;                          // steps with the limit until it is judged
+    double step_before = 0.0;  // the limit
+    long since = 0;            // steps when it was judged last
+    long trial = 40;           // steps with the limit until it is judged
     double t_since = 0.0;
     long not_before = 0;  // steps; after a limit that made the steps shorter
   };
 
-  void* ida_mem_;
+  IdaSettings& settings_;
   const Options& options_;
   State now_;
+  OwnedVector kept_slope_, slope_;  // y' of a step and of the next one
 };
 
 }  // namespace tether::ida_projection

@@ -15,11 +15,11 @@
 // Krylov methods solve to the tolerance of IDA's own test: delta would be as inexact as the noise
 // that it should remove.
 #include "step/polish.hpp"
-#include "host/mechanisms.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "host/mechanisms.hpp"
 
 namespace tether::ida_projection {
 
@@ -55,7 +55,7 @@ double Polish::longest_without_response(bool smoothing) const {
 }
 
 void Polish::keep(const Candidate& candidate) {
-  noise_known_ = step_known_ = false;
+  known_ = Known::nothing;
   N_VScale(1.0, candidate.correction, corrected_);
 }
 
@@ -65,6 +65,11 @@ bool Polish::newton_step(N_Vector delta) {
   ++statistics_.residual_evaluations;
   N_VScale(-1.0, delta, delta);
   return corrector_.solve_linear(delta);
+}
+
+bool Polish::know_noise() {
+  if (known_ == Known::nothing && newton_step(noise_)) known_ = Known::noise;
+  return known_ != Known::nothing;
 }
 
 // The same at ypred - dy: IDA's own callback adds ycor to IDA's ypred and yppred, so that ypred is
@@ -80,8 +85,9 @@ bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
 
 double Polish::response_length(const Candidate& candidate) {
   if (!know_noise()) return -1.0;
-  step_known_ = newton_step_at_moved_point(candidate);
-  if (!step_known_) return -1.0;
+  forget_step();
+  if (!newton_step_at_moved_point(candidate)) return -1.0;
+  known_ = Known::noise_and_step;
   N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
   const double length = differential_length(candidate, work_);
   return std::isfinite(length) ? length : -1.0;
@@ -100,10 +106,11 @@ const double* Polish::response(const StepData& step) {
 
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance, bool moved) {
   if (in_use(Mechanism::forecast_polish) && forecast_polish(candidate, cj, tolerance))
-    return {true, true};
-  const bool known = step_known_;
-  if (!known && !(moved ? newton_step_at_moved_point(candidate) : newton_step(delta_))) return {};
-  step_known_ = false;
+    return Fix::confirmed;
+  const bool known = known_ == Known::noise_and_step;
+  if (!known && !(moved ? newton_step_at_moved_point(candidate) : newton_step(delta_)))
+    return Fix::none;
+  forget_step();
   ++iterations_;
 
   const double algebraic = algebraic_factor(cj);
@@ -111,14 +118,14 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
   const double length = differential_length(candidate, delta_);
   if (!std::isfinite(variables_.any() ? N_VWrmsNorm(delta_, candidate.weights) : length)) {
     N_VConst(0.0, delta_);
-    return {true, false};
+    return Fix::misled;
   }
   if (!known) learn_pattern(candidate, cj);
   const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
   if (variables_.any() && algebraic > 0.0) ++statistics_.refreshes;
-  return {true, length <= kMisledFactor * tolerance};
+  return length <= kMisledFactor * tolerance ? Fix::confirmed : Fix::misled;
 }
 
 void Polish::learn_pattern(const Candidate& candidate, double cj) {
@@ -129,18 +136,14 @@ void Polish::learn_pattern(const Candidate& candidate, double cj) {
 
 // ycor <- ycor + delta, if delta can be forecast.
 bool Polish::forecast_polish(const Candidate& candidate, double cj, double tolerance) {
-  if (!forecast_ || step_known_ || corrector_.iterations() != 1 || !forecast_->can_forecast(cj))
+  if (!forecast_ || known_ == Known::noise_and_step || corrector_.iterations() != 1 ||
+      !forecast_->can_forecast(cj))
     return false;
   forecast_->tell(cj, corrected_, delta_);
   if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisledFactor * tolerance)) return false;
   forecast_->used();
   N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);
   return true;
-}
-
-double Polish::differential_length(const Candidate& candidate, N_Vector v) const {
-  return variables_.any() ? N_VWrmsNormMask(v, candidate.weights, variables_.id())
-                          : N_VWrmsNorm(v, candidate.weights);
 }
 
 // delta_d <- differential * delta_d, delta_a <- algebraic * delta_a, ycor <- ycor + delta.

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "fast/kernels.hpp"
@@ -10,16 +11,73 @@
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
-#include "step/polish_forecast.hpp"
 
 namespace tether::ida_projection {
 
-/// Outcome of a polish.
-struct Fix {
-  bool made = false;  ///< false: F or the linear solver fails, or there is none
-  /// Whether delta was as short as IDA's convergence test promised.
-  bool corrector_was_right = true;
+/// Forecasts the polish delta of a correction from earlier ones, in forms without algebraic
+/// variables.
+///
+/// IDA multiplies its linear solutions by 2 / (1 + r), r = cj / (cj of its factors). Where F is not
+/// stiff this leaves the part -kappa, kappa = (r - 1) / (r + 1), of a correction (method, eq. 11).
+/// With unchanged factors delta = share ycor + rest, and the rest changes slowly. If share is near
+/// -kappa, it is known for other values of cj as well.
+class PolishForecast {
+ public:
+  explicit PolishForecast(N_Vector like) : beyond_(like), work_(like) { N_VConst(0.0, beyond_); }
+  void quicken() const { fast::quicken({beyond_, work_}, false); }
+  void forget() { cj_ = 0.0; }
+  /// IDA has new factors, made for this cj.
+  void renewed(double cj) {
+    cj_at_setup_ = cj;
+    forget();
+  }
+  /// Learns from a computed delta.
+  void learn(N_Vector weights, N_Vector ycor, N_Vector delta, double cj) {
+    const auto small = [&](N_Vector v) { return N_VWrmsNorm(v, weights) <= kUnseen; };
+    const bool learnt = known(cj);
+    if (learnt) {
+      N_VLinearSum(1.0, delta, -share_at(cj), ycor, work_);
+      N_VLinearSum(1.0, work_, -1.0, beyond_, work_);
+      allowance_ = small(work_) ? std::min(2 * allowance_ + 1, kMost) : allowance_ / 2;
+    }
+    N_VProd(ycor, weights, work_);
+    const double square = N_VDotProd(work_, work_);
+    N_VProd(work_, weights, work_);
+    share_ = square > 0.0 ? N_VDotProd(work_, delta) / square : 0.0;
+    N_VLinearSum(1.0, delta, -share_, ycor, beyond_);
+    if (!learnt) allowance_ = small(beyond_) ? 1 : 0;
+    cj_ = cj;
+    used_in_row_ = 0;
+    N_VLinearSum(1.0, delta, kappa(cj), ycor, work_);
+    not_stiff_ = small(work_);
+  }
+  /// Whether delta can be forecast for a correction with this cj.
+  bool can_forecast(double cj) const { return used_in_row_ < allowance_ && known(cj); }
+  void tell(double cj, N_Vector ycor, N_Vector delta) const {
+    N_VLinearSum(share_at(cj), ycor, 1.0, beyond_, delta);
+  }
+  void used() { ++used_in_row_; }
+
+ private:
+  // Tolerances, a tenth of what IDA's convergence test leaves: errors that may be.
+  static constexpr double kUnseen = 0.03;
+  static constexpr int kMost = 15;  // in a row
+
+  double kappa(double cj) const { return (cj - cj_at_setup_) / (cj + cj_at_setup_); }
+  bool known(double cj) const { return cj_ != 0.0 && (cj == cj_ || not_stiff_); }
+  double share_at(double cj) const { return share_ + kappa(cj_) - kappa(cj); }
+
+  OwnedVector beyond_, work_;
+  double cj_at_setup_ = 0.0;
+  double cj_ = 0.0;         // of the last iteration; 0: there was none with these factors
+  double share_ = 0.0;      // delta was share ycor + beyond
+  bool not_stiff_ = false;  // and next to -kappa ycor
+  int allowance_ = 0, used_in_row_ = 0;
 };
+
+/// Outcome of a polish: none was made, or F or the linear solver failed; delta was as short as
+/// IDA's convergence test promised; or the test was misled.
+enum class Fix { none, confirmed, misled };
 
 /// Removes the noise that IDA's convergence test leaves, and lets the algebraic variables respond
 /// to the move; see polish.cpp.
@@ -75,7 +133,7 @@ class Polish {
   Fix add_newton_step(const Candidate& candidate, double cj, double tolerance, bool moved);
   /// Restores the corrector's ycor.
   void restore(const Candidate& candidate) {
-    step_known_ = false;  // that move is not the next one
+    forget_step();  // that move is not the next one
     N_VScale(1.0, corrected_, candidate.correction);
   }
 
@@ -87,14 +145,21 @@ class Polish {
   long iterations() const { return iterations_; }    ///< in this solve()
 
  private:
-  /// -J^-1 F at the corrector's point.
-  bool know_noise() { return noise_known_ = noise_known_ || newton_step(noise_); }
+  enum class Known { nothing, noise, noise_and_step };
+
+  bool know_noise();
+  void forget_step() {
+    if (known_ == Known::noise_and_step) known_ = Known::noise;
+  }
   bool newton_step(N_Vector delta);
   bool newton_step_at_moved_point(const Candidate& candidate);
   bool forecast_polish(const Candidate& candidate, double cj, double tolerance);
   void learn_pattern(const Candidate& candidate, double cj);
   /// WRMS over the differential variables.
-  double differential_length(const Candidate& candidate, N_Vector v) const;
+  double differential_length(const Candidate& candidate, N_Vector v) const {
+    return variables_.any() ? N_VWrmsNormMask(v, candidate.weights, variables_.id())
+                            : N_VWrmsNorm(v, candidate.weights);
+  }
   void apply(const Candidate& candidate, double differential, double algebraic);
 
   const Options& options_;
@@ -102,9 +167,9 @@ class Polish {
   Corrector& corrector_;
   const AlgebraicVariables& variables_;
   OwnedVector delta_, corrected_, work_, noise_, residual_;
-  bool noise_known_ = false;  // -J^-1 F at corrected_
-  bool step_known_ = false;   // delta_ is that of the present moved point
-  bool iterative_ = false;    // IDA's linear solver is a Krylov method
+  // noise_ is -J^-1 F at corrected_, delta_ the Newton step of the present moved point.
+  Known known_ = Known::nothing;
+  bool iterative_ = false;  // IDA's linear solver is a Krylov method
   double cj_at_setup_ = 0.0;
   std::optional<PolishForecast> forecast_;
   long iterations_ = 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "step/polish.hpp"
 
@@ -10,123 +11,108 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kTrapped = 30;      // ten steps in a row with failed error tests, see refused_
 constexpr int kRefused = 3;       // failed error tests in one step
 constexpr int kOftenRefused = 4;  // steps for each failed error test, of the run so far
-
-// Norm of IDA's error test; `mask` is 1 for the variables that it sees.
-double error_norm(N_Vector v, N_Vector weights, N_Vector mask) {
-  return mask != nullptr ? N_VWrmsNormMask(v, weights, mask) : N_VWrmsNorm(v, weights);
-}
+constexpr int kTrapped =
+    10 * (kOftenRefused - 1);  // ten steps in a row with failed ones, see refused_
 
 }  // namespace
 
 void StepControl::reset() {
   weights_factor_ = 1.0;
-  smoother_.reset();
   order_limit_.reset();
+  if (options_.step_smoothing || smoother_.on()) {
+    settings_.forget();
+    settings_.set({});
+  }
+  smoother_.end();
+  if (options_.step_smoothing) smoother_.begin({});
   algebraic_test_.begin({});
   refused_ = 0;
-  last_error_failures_ = 0;
-  corrector_has_failed_ = false;
+  last_error_failures_ = corrector_failures_ = 0;
 }
 
-// IDA computes its weights for a new step only, so that another attempt would find changed ones.
-void StepControl::restore_weights(N_Vector weights, long last_steps) {
-  const long steps = ida_.steps();
-  if (weights_factor_ != 1.0 && steps == last_steps)
-    N_VScale(1.0 / weights_factor_, weights, weights);
-  weights_factor_ = 1.0;
-  algebraic_test_.restore(weights, steps);
+void StepControl::restore_weights(N_Vector weights, bool same_step) {
+  const double factor = std::exchange(weights_factor_, 1.0);
+  if (!same_step) return;
+  if (factor != 1.0) N_VScale(1.0 / factor, weights, weights);
+  algebraic_test_.restore(weights);
 }
 
-void StepControl::widen_test(const Candidate& candidate, Polish& polish, double move, long steps) {
-  if (!algebraic_test_.acts() || !std::isfinite(move)) return;
-  algebraic_test_.begin_attempt(candidate, move, ida_.order(), std::abs(ida_.step_size()), steps);
-  const bool asks = polish.iterations() > 0 && algebraic_test_.limit_step();
-  algebraic_test_.widen(candidate, asks ? polish.response(ida_.step()) : nullptr);
+void StepControl::suppress_others(N_Vector tested, const std::vector<int>& coupled) {
+  settings_.test(tested, true);
+  algebraic_test_.begin(coupled);
 }
 
 // |ycor| decides the next step size, its ratio to the second difference the order.
-void StepControl::control(const Candidate& candidate, long steps, bool engaged, N_Vector tested,
-                          N_Vector differential, N_Vector unmoved) {
+void StepControl::choose_step(const Attempt& attempt, const Candidate& candidate, Polish& polish,
+                              double move, N_Vector tested, N_Vector differential,
+                              N_Vector unmoved) {
+  const bool engaged = std::isfinite(move);
+  if (algebraic_test_.acts() && engaged) {
+    const bool limits = algebraic_test_.begin_attempt(attempt, candidate, move);
+    algebraic_test_.widen(candidate,
+                          limits && polish.iterations() > 0 ? polish.response(attempt) : nullptr);
+  }
   if (!engaged && !smoother_.on()) return;
-  const auto norm = [&] { return error_norm(candidate.correction, candidate.weights, tested); };
+  const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
+  Control control;
   if (smoother_.on()) {
-    order_limit_.end();
-    weights_factor_ = smoother_.control(steps, norm());
+    control = smoother_.control(attempt, norm(candidate.correction));
   } else {
-    compare_slopes(candidate, steps, differential);
-    weights_factor_ =
-        order_limit_.control(steps, candidate.t, order_limit_.lowering() ? norm() : 0.0);
+    control = order_limit_.control(attempt, candidate, tested, differential);
     statistics_.order_limited = order_limit_.begun();
   }
-  // In the local metric a long move may undo what a jump of F has changed. The error test therefore
-  // sees the longer one of the corrections before and after the move.
+  settings_.set(control.bounds);
+  weights_factor_ = control.weights_factor;
+  // In the local metric a sudden move may undo what a jump of F has changed. The error test
+  // therefore sees the longer one of the corrections before and after the move.
   if (unmoved != nullptr) {
-    const double before = error_norm(unmoved, candidate.weights, tested), after = norm();
-    const bool hides = before > ida_.order() + 1 && after > 0.0 && before > after;
+    const double before = norm(unmoved), after = norm(candidate.correction);
+    const bool hides = before > attempt.order + 1 && after > 0.0 && before > after;
     if (hides) weights_factor_ *= before / after;
   }
   if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
 }
 
-void StepControl::corrector_failed(bool engaged) {
-  corrector_has_failed_ = true;
-  if (!engaged) return;
+void StepControl::corrector_failed() {
+  ++corrector_failures_;
   smoother_.refuse(std::abs(ida_.step_size()));
-}
-
-// Compares y' of two successive steps, now and then, for the order limit.
-void StepControl::compare_slopes(const Candidate& candidate, long steps, N_Vector differential) {
-  const bool keeps = order_limit_.keeps_slope(steps);
-  if (!keeps && !(kept_slope_ && order_limit_.compares_slopes(steps))) return;
-  const StepData step = ida_.step();
-  if (!kept_slope_) {
-    kept_slope_ = OwnedVector(candidate.base);
-    slope_ = OwnedVector(candidate.base);
-  }
-  N_Vector slope = keeps ? kept_slope_ : slope_;
-  N_VLinearSum(1.0, step.yp_predicted, step.cj, candidate.correction, slope);
-  if (keeps) return;
-  N_VLinearSum(1.0, slope, -1.0, kept_slope_, slope);
-  order_limit_.note_differences(
-      steps, error_norm(candidate.correction, candidate.weights, differential),
-      ida_.step_size() * error_norm(slope, candidate.weights, differential));
 }
 
 // IDA may double its step right after a doubling was rejected, and raises the order only after k +
 // 2 steps of one size. At order 1 a failed error test in each step, or after each three of one
 // size, can therefore go on for ever.
-void StepControl::count_refusals(bool engaged) {
-  if (smoother_.on()) return;
-  const long failures = ida_.error_test_failures();
-  refused_ =
-      failures > last_error_failures_ ? refused_ + kOftenRefused - 1 : std::max(0, refused_ - 1);
-  last_error_failures_ = failures;
-  if (engaged && refused_ >= kTrapped) begin_smoothing(SetpointFactors());
+void StepControl::begin_attempt(const Attempt& attempt, bool engaged) {
+  if (attempt.repeated || smoother_.on()) return;
+  const long failures = attempt.error_test_failures;
+  refused_ = std::exchange(last_error_failures_, failures) < failures ? refused_ + kOftenRefused - 1
+                                                                      : std::max(0, refused_ - 1);
+  if (engaged && refused_ >= kTrapped) begin_smoothing({});
 }
 
-bool StepControl::struggling() const {
-  if (!options_.suppress_algebraic) return false;
-  return refused_ >= kTrapped || ida_.error_test_failures() - last_error_failures_ >= kRefused;
+bool StepControl::struggling(const Attempt& attempt) const {
+  return options_.suppress_algebraic &&
+         (refused_ >= kTrapped || attempt.error_test_failures - last_error_failures_ >= kRefused);
 }
 
 // A host that never tested algebraic variables, by IDASetSuppressAlg, may start off their
 // equations.
-bool StepControl::starts_off_equations(long steps) const {
-  return steps == 0 && algebraic_test_.acts() && ida_.error_test_failures() >= kRefused &&
+bool StepControl::starts_off_equations(const Attempt& attempt) const {
+  return attempt.steps == 0 && algebraic_test_.acts() && attempt.error_test_failures >= kRefused &&
          algebraic_test_.stay();
 }
 
-bool StepControl::in_trouble(long steps) const {
-  if (!options_.suppress_algebraic) return false;
-  const long failures = ida_.error_test_failures();
-  return corrector_has_failed_ || (failures > 1 && kOftenRefused * failures > steps);
+bool StepControl::in_trouble(const Attempt& attempt) const {
+  const long failures = attempt.error_test_failures;
+  return options_.suppress_algebraic &&
+         (corrector_failures_ > 0 || (failures > 1 && kOftenRefused * failures > attempt.steps));
 }
 
 void StepControl::begin_smoothing(const SetpointFactors& factors) {
   if (smoother_.on() || !options_.advanced.smooth_where_needed) return;
+  order_limit_.end();
+  settings_.forget();
   smoother_.begin(factors);
   ++statistics_.smoothing_begun;
 }

@@ -6,16 +6,20 @@
 #include <optional>
 #include <tether/ida_projection/options.hpp>
 
-namespace tether::ida_projection {
+#include "start/algebraic.hpp"
+#include "step/attempt.hpp"
+#include "step/ida_settings.hpp"
 
-/// A bound of IDASetEtaFixedStepBounds that no ratio of steps reaches: keep h.
-constexpr double kAnyRatio = 1e30;
+namespace tether::ida_projection {
 
 /// Factors of the setpoint s: at the largest order, and its least value at lower orders, see
 /// StepSmoother::setpoint().
 struct SetpointFactors {
   double most = 1.0, least = 1.0;
 };
+/// Those of forms of index 2, with this number of rows (method, section 7).
+SetpointFactors setpoint_of_high_index(const Candidate& candidate,
+                                       const AlgebraicVariables& variables, int rows);
 
 /// Soederlind's filter H211b (ACM TOMS 29 (2003) 1-26), p = k + 1, k the order:
 ///
@@ -32,57 +36,28 @@ struct SetpointFactors {
 /// many. The filter approaches sizes that were rejected.
 class StepSmoother {
  public:
-  StepSmoother(void* ida_mem, const Options& options) : ida_mem_(ida_mem), options_(options) {}
+  explicit StepSmoother(const Options& options) : options_(options) {}
 
-  /// Before the first step: on only if Options::step_smoothing says so.
-  void reset();
-  /// From here on, in the middle of a run; leaves IDASetMaxStep alone, which the host may have
-  /// used. The setpoint is `factors.most` times the usual one.
-  void begin(const SetpointFactors& factors) {
-    on_ = true;
-    settings_.reset();
-    now_.factors = factors;
-  }
-  bool on() const { return on_; }
+  /// From this attempt on; see SetpointFactors.
+  void begin(const SetpointFactors& factors) { now_.emplace().factors = factors; }
+  void end() { now_.reset(); }
+  bool on() const { return now_.has_value(); }
   /// The corrector failed at this step size.
-  void refuse(double h) { now_.refused = h; }
-  /// At the end of a successful solve: `steps` accepted before this attempt, `norm` = |ycor| in the
-  /// norm of IDA's error test. Returns by how much IDA's error weights are to be multiplied for
-  /// the rest of this attempt (1: left alone); see reduce_by_weights().
-  double control(long steps, double norm);
+  void refuse(double h) {
+    if (now_) now_->refused = h;
+  }
+  /// At the end of a successful solve, `norm` = |ycor| in the norm of IDA's error test.
+  Control control(const Attempt& attempt, double norm);
 
  private:
-  static constexpr int kMaximumOrder = 5;
+  static constexpr int kMaximumOrder = 5;      // of BDF in IDA
   static constexpr double kLargest = 2.0;      // growth of h in a step, by IDA's default
-  static constexpr double kNearRefused = 0.9;  // of a rejected size: as large as that size
+  static constexpr double kNearRefused = 0.9;  // of a rejected size: IDA's own least reduction
 
-  void note_previous(long steps, double h, int order);
-  void attempt_was_accepted();
-  double setpoint(int order) const;
-  double error_constant(double h, int order) const;
-  double test_constant(double h, int order) const;
-  double filter(double log_c, int order) const;
-  bool far_below(double log_c, int order) const;
-  bool near_refused(double h) const {
-    return now_.refused > 0.0 && h >= kNearRefused * now_.refused;
-  }
-  void hold();
-  double request(double ratio, double h, bool grows, double norm);
-  double reduce_by_weights(double ratio, double h, double norm);
-  // The settings of IDA, by default its own.
-  struct Settings {
-    double lowest_fixed = 1.0, highest_fixed = 2.0;  // IDASetEtaFixedStepBounds
-    double largest = kLargest;
-    double low = 0.0;  // IDASetEtaLow and IDASetEtaMin; 0: as IDA has them
-    double max_step = 0.0;
-  };
-  void set(const Settings& settings);
-
-  // From a new run on.
+  // From the beginning on.
   struct State {
     SetpointFactors factors;
-    long steps = -1;  // accepted before the attempt that IDA has not yet judged; -1: there is none
-    double h = 0.0, log_c = 0.0;  // of it
+    double h = 0.0, log_c = 0.0;  // of the attempt that IDA judges; 0: there was none
     int order = 0;
     std::array<double, kMaximumOrder> past{};  // accepted sizes, the latest first
     int known = 0;                             // of these
@@ -91,17 +66,26 @@ class StepSmoother {
     std::optional<double> previous;  // log c before the present step or block
     double block_sum = 0.0;          // of log c over the steps of one size and order
     int block = 0;
+
     void end_block() {
       block = 0;
       block_sum = 0.0;
     }
+    double past_or(double size, int i) const {
+      return i < known ? past[static_cast<std::size_t>(i)] : size;
+    }
   };
 
-  void* ida_mem_;
-  std::optional<Settings> settings_;  // IDA has these
+  void note_previous(bool accepted, double h, int order);
+  double setpoint(int order) const;
+  double error_constant(double h, int order) const;
+  double test_constant(double h, int order) const;
+  double filter(double log_c, int order) const;
+  Control request(double ratio, double error, double norm) const;
+  Control reduce_by_weights(double ratio, double error, double norm) const;
+
   const Options& options_;
-  bool on_ = false;
-  State now_;
+  std::optional<State> now_;
 };
 
 }  // namespace tether::ida_projection

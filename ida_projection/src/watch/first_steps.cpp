@@ -32,43 +32,44 @@ void FirstSteps::reset() {
   run_.rows.resize(static_cast<std::size_t>(constraints_.total_count()));
 }
 
-std::string FirstSteps::check(const Candidate& candidate, const StepData& step, long steps,
-                              double h, N_Vector corrected, const AlgebraicVariables& variables,
-                              Mover& mover, Corrector& corrector) {
-  Attempt at{candidate, step, h, corrected, nullptr, corrector};
-  std::string found = compare_with_tolerances(at, steps);
+std::string FirstSteps::check(const Candidate& candidate, const Attempt& attempt,
+                              N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
+                              Corrector& corrector) {
+  Corrected at{candidate, attempt, corrected, attempt.h, nullptr, corrector};
+  std::string found = compare_with_tolerances(at);
   // In forms of index 2 and more y' and multipliers carry the error of derivatives that F lacks.
   if (!found.empty() || variables.high_index() || !variables.index_known()) return found;
+  const long steps = attempt.steps;
   const bool due = steps > kSteps || steps % 2 == 0;
   if (!due || run_.checks >= allowed_checks(steps) || candidate.base_entries == nullptr ||
       !has_values(constraints_))
     return found;
   at.id = variables.mask();
-  at.h = h * static_cast<double>(std::max(1L, steps - std::exchange(run_.last_check, steps)));
+  at.span *= static_cast<double>(std::max(1L, steps - std::exchange(run_.last_check, steps)));
   return find_false_rows(at, mover);
 }
 
 // If |y| is below a tolerance in the norm of the error test, y = 0 would pass the test as well. A
 // solution that has decayed, or still grows, is no fault of the tolerances.
-std::string FirstSteps::compare_with_tolerances(const Attempt& at, long steps) {
-  if (!(run_.largest < 1.0) || steps > kSteps) return {};
+std::string FirstSteps::compare_with_tolerances(const Corrected& at) {
+  if (!(run_.largest < 1.0) || at.attempt.steps > kSteps) return {};
   N_Vector weights = at.candidate.weights;
   if (!work_) work_ = OwnedVector(weights);
-  N_VLinearSum(1.0, at.candidate.base, 1.0, at.corrected, work_);
+  N_VLinearSum(1.0, at.candidate.base, 1.0, at.ycor, work_);
   const double size = N_VWrmsNorm(work_, weights);
-  N_VLinearSum(1.0, at.step.yp_predicted, at.step.cj, at.corrected, work_);
-  const double change = std::abs(at.h) * N_VWrmsNorm(work_, weights);
+  N_VLinearSum(1.0, at.attempt.yp_predicted, at.attempt.cj, at.ycor, work_);
+  const double change = std::abs(at.span) * N_VWrmsNorm(work_, weights);
   const bool grows = size > kGrows * run_.largest;
   run_.largest = std::max(run_.largest, size);
   if (!(size < 1.0) || grows || !(change > kMoves * size)) return {};
   if (++run_.small_solutions != kSeen) return {};
-  return "the whole solution is " + brief(size) + " tolerances long at t = " + brief(at.step.t) +
+  return "the whole solution is " + brief(size) + " tolerances long at t = " + brief(at.attempt.t) +
          ", so that IDA's error test cannot see it: reduce atol";
 }
 
 // Tests C y' + g_t = 0 at the corrector's point, where y' satisfies F. C y' costs a product with
 // the present C; g is evaluated only for a row that stands out.
-std::string FirstSteps::find_false_rows(const Attempt& at, Mover& mover) {
+std::string FirstSteps::find_false_rows(const Corrected& at, Mover& mover) {
   const auto n = static_cast<std::size_t>(N_VGetLength(at.candidate.base));
   if (point_.size() != n) {  // all that a comparison needs, so that none allocates
     for (std::vector<double>* each : {&point_, &slope_, &better_, &better_p_}) each->resize(n);
@@ -76,14 +77,14 @@ std::string FirstSteps::find_false_rows(const Attempt& at, Mover& mover) {
     faults_.reserve(n);
     for (OwnedVector* each : {&work_, &base_, &ycor_}) *each = OwnedVector(at.candidate.base);
   }
-  const double* predicted = N_VGetArrayPointer(at.step.yp_predicted);
-  const double* ycor = N_VGetArrayPointer(at.corrected);
+  const double* predicted = N_VGetArrayPointer(at.attempt.yp_predicted);
+  const double* ycor = N_VGetArrayPointer(at.ycor);
   for (std::size_t j = 0; j < n; ++j) {
     point_[j] = at.candidate.base_entries[j] + ycor[j];
-    slope_[j] = predicted[j] + at.step.cj * ycor[j];
+    slope_[j] = predicted[j] + at.attempt.cj * ycor[j];
   }
   if (!mover.tangency(slope_, at.id, tangency_)) return {};
-  std::string text = find_one_sided_row(at.step.t);
+  std::string text = find_one_sided_row(at.attempt.t);
   if (!text.empty()) return text;
   const double root = std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < tangency_.rate.size(); ++i) {
@@ -93,8 +94,8 @@ std::string FirstSteps::find_false_rows(const Attempt& at, Mover& mover) {
                       "nothing else and may be left out";
     if (!(tangency_.terms[i] >= 0.0)) continue;
     Row& row = run_.rows[i];
-    row.sum += tangency_.rate[i] * at.h;
-    row.span += at.h;
+    row.sum += tangency_.rate[i] * at.span;
+    row.span += at.span;
     const double noticed = kOffItsSet * root * tangency_.tolerance[i];
     if (!(std::abs(row.sum) > row.limit * noticed) && row.suspected == 0.0) continue;
     text = diagnose(static_cast<int>(i), noticed, at);
@@ -118,7 +119,7 @@ std::string FirstSteps::find_one_sided_row(double t) {
 
 // Refines y' by one iteration for F at better_. It then contains neither the rest that IDA's
 // convergence test allows nor the distance from the constraints. ycor_ begins as the corrector's.
-bool FirstSteps::refine_slope(const Attempt& at) {
+bool FirstSteps::refine_slope(const Corrected& at) {
   double* const base = at.candidate.base_entries;
   double* const correction = N_VGetArrayPointer(ycor_);
   N_VScale(1.0, at.candidate.base, base_);
@@ -131,23 +132,23 @@ bool FirstSteps::refine_slope(const Attempt& at) {
   const double* delta = N_VGetArrayPointer(work_);
   for (std::size_t j = 0; j < better_.size(); ++j) {
     correction[j] += delta[j];
-    better_p_[j] += at.step.cj * delta[j];
+    better_p_[j] += at.attempt.cj * delta[j];
     if (at.id != nullptr && at.id[j] == 0.0) better_[j] += delta[j];
   }
   return true;
 }
 
 // Returns the fault of the row, or an empty text.
-std::string FirstSteps::diagnose(int row, double noticed, const Attempt& at) {
+std::string FirstSteps::diagnose(int row, double noticed, const Corrected& at) {
   const auto i = static_cast<std::size_t>(row);
-  const double t = at.step.t;
+  const double t = at.attempt.t;
   const auto rate_along = [&](const std::vector<double>& y, const std::vector<double>& yp) {
     return faults_.rates(t, y, yp, rates_) ? rates_[i] : 0.0;
   };
   better_p_ = slope_;
   for (std::size_t j = 0; j < better_.size(); ++j)
     better_[j] = at.candidate.base_entries[j] + at.candidate.correction_entries[j];
-  N_VScale(1.0, at.corrected, ycor_);
+  N_VScale(1.0, at.ycor, ycor_);
   double before = 0.0, along = 0.0;
   bool known = true;
   for (int k = 0; k < kRefinements && known; ++k) {
@@ -169,8 +170,6 @@ std::string FirstSteps::diagnose(int row, double noticed, const Attempt& at) {
   if (settled && std::abs(of.verified) > kConfirmed * noticed) of.suspected = along;
   // At a singular position F determines no y', whatever the sum: the next check decides.
   if (std::abs(earlier - of.suspected) < kAgree * std::abs(of.suspected)) {
-    const std::string kink = may_search() ? faults_.kink(row, t, point_) : std::string();
-    if (!kink.empty()) return kink;
     run_.false_row_found = true;
     return faults_.unkept_text(row, "at t = " + brief(t) + " ", along, terms);
   }

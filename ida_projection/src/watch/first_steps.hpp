@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "host/ida.hpp"
 #include "host/owned_vector.hpp"
 #include "movers/mover.hpp"
 #include "start/algebraic.hpp"
+#include "step/attempt.hpp"
 #include "watch/row_faults.hpp"
 
 namespace tether::ida_projection {
@@ -18,6 +18,7 @@ class FirstSteps {
  public:
   /// Number of accepted steps in which rows and tolerances are checked.
   static constexpr long kSteps = 100;
+  static constexpr long kEvery = 16;  ///< steps, after these; observations that cost take as many
 
   FirstSteps(const Constraints& constraints, RowFaults& faults)
       : constraints_(constraints), faults_(faults) {}
@@ -31,22 +32,20 @@ class FirstSteps {
   bool false_row_found() const { return run_.false_row_found; }
   /// Names a row that would move only algebraic variables that F determines; empty: there is none.
   const std::string& idle_row() const { return run_.idle_row; }
-  /// After a successful move in the step after `steps` of size h; `corrected`: the corrector's
-  /// ycor. Returns the fault found; empty: none.
-  std::string check(const Candidate& candidate, const StepData& step, long steps, double h,
-                    N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
-                    Corrector& corrector);
+  /// After a successful move; `corrected`: the corrector's ycor. Returns the fault found; empty:
+  /// none.
+  std::string check(const Candidate& candidate, const Attempt& attempt, N_Vector corrected,
+                    const AlgebraicVariables& variables, Mover& mover, Corrector& corrector);
 
  private:
   static constexpr long kSettled = 2;  // accepted steps: before, y' is still that of the start
-  static constexpr long kEvery = 16;   // steps, after the first ones
 
   // An attempt as the corrector left it.
-  struct Attempt {
+  struct Corrected {
     const Candidate& candidate;
-    const StepData& step;
-    double h;  // since the last check
-    N_Vector corrected;
+    const Attempt& attempt;
+    N_Vector ycor;
+    double span;  // of time, since the last check
     const double* id;
     Corrector& corrector;
   };
@@ -67,11 +66,11 @@ class FirstSteps {
     std::size_t searched = 0;  // unknowns compared
   };
 
-  std::string compare_with_tolerances(const Attempt& at, long steps);
-  std::string find_false_rows(const Attempt& at, Mover& mover);
+  std::string compare_with_tolerances(const Corrected& at);
+  std::string find_false_rows(const Corrected& at, Mover& mover);
   std::string find_one_sided_row(double t);
-  bool refine_slope(const Attempt& at);
-  std::string diagnose(int row, double noticed, const Attempt& at);
+  bool refine_slope(const Corrected& at);
+  std::string diagnose(int row, double noticed, const Corrected& at);
   bool may_search() const { return faults_.may_search(run_.searched + point_.size()); }
 
   const Constraints& constraints_;

@@ -10,7 +10,7 @@ namespace {
 
 // Failures in one step after which they are printed; IDA gives up after ten. More are normal in the
 // first step, whose size IDA finds by trying.
-constexpr int kSayAfter = 4, kSayAfterAtFirst = 8;
+constexpr int kSayAfter = 4;
 
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 
@@ -50,10 +50,7 @@ const char* to_string(Status status) {
 
 int Report::finish(Status outcome, const std::string& text, long steps) {
   status = outcome;
-  if (outcome == Status::success) {
-    if (message != advice) message = advice;
-    return 0;
-  }
+  if (outcome == Status::success) return succeed();
   message = text;
   for (const Outcome& counted : outcomes)
     if (counted.status == outcome && counted.count != nullptr) ++(statistics_.*counted.count);
@@ -77,36 +74,35 @@ int Report::caught(Status outcome, const char* text) noexcept {
 
 // Once: IDA reports the failure of the run by itself.
 void Report::print_fatal(const char* text) noexcept {
-  if (!options_.print || std::exchange(printed_, true)) return;
+  if (!options_.print || !first_of(Status::callback_fatal)) return;
   std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
 }
 
 bool Report::prints_failures(long steps) const {
   const int failures = steps == failing_step_ ? failures_in_step_ + 1 : 1;
-  return failures >= (steps == 0 ? kSayAfterAtFirst : kSayAfter);
+  return failures >= (steps == 0 ? 2 * kSayAfter : kSayAfter);
 }
 
 void Report::count_failure_in_step(const std::string& text, long steps) {
   const bool prints = prints_failures(steps);
   failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
   failing_step_ = steps;
-  if (prints)
-    print_once(Status::not_converged, "step " + std::to_string(steps + 1) + " was tried " +
-                                          std::to_string(failures_in_step_) +
-                                          " times without a point on the constraints: " + text);
+  if (prints && first_of(Status::not_converged))
+    print("step " + std::to_string(steps + 1) + " was tried " + std::to_string(failures_in_step_) +
+          " times without a point on the constraints: " + text);
 }
 
 void Report::warn(Status kind, const std::string& text, const std::string& printed) {
   warning_ = text;
   warning_status_ = kind;
-  print_once(kind, printed);
+  if (first_of(kind)) print(printed);
 }
 
-// A bit for each kind: not again after every IDAReInit.
-void Report::print_once(Status kind, const std::string& text) {
-  const unsigned bit = 1U << static_cast<unsigned>(kind);
-  if ((printed_kinds_ & bit) == 0) print(text);
-  printed_kinds_ |= bit;
+// Whether nothing of this kind was printed yet: not again after every IDAReInit. A bit for each
+// kind, one for all that end the run.
+bool Report::first_of(Status kind) noexcept {
+  const unsigned bit = 1U << static_cast<unsigned>(is_fatal(kind) ? Status::unused : kind);
+  return (std::exchange(printed_kinds_, printed_kinds_ | bit) & bit) == 0;
 }
 
 void Report::print(const std::string& text) const {

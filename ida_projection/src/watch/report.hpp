@@ -24,6 +24,15 @@ class Report {
   /// Status, text and count of an outcome in the attempt at the step after `steps`; the code that
   /// IDA wants.
   int finish(Status outcome, const std::string& text, long steps);
+  /// The same for success, of which the message is the advice.
+  int succeed() {
+    status = Status::success;
+    if (message != advice) message = advice;
+    return 0;
+  }
+  void advise(const std::string& text) {
+    if (!text.empty()) advice = text;
+  }
   /// The same for an exception, which must not pass through IDA's C functions.
   int caught(Status outcome, const char* text) noexcept;
   /// Whether the next failure in the step after `steps` is printed.
@@ -50,14 +59,13 @@ class Report {
  private:
   void count_failure_in_step(const std::string& text, long steps);
   void print_fatal(const char* text) noexcept;
-  void print_once(Status kind, const std::string& text);
+  bool first_of(Status kind) noexcept;
 
   const Options& options_;
   Statistics& statistics_;
   std::string warning_;
   Status warning_status_ = Status::success;
-  unsigned printed_kinds_ = 0;  // a bit for each kind of warning
-  bool printed_ = false;        // the failure of the run
+  unsigned printed_kinds_ = 0;
   long failing_step_ = -1;
   int failures_in_step_ = 0;
 };

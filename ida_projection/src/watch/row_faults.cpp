@@ -6,23 +6,20 @@
 #include <numeric>
 
 #include "host/shortest.hpp"
-#include "start/undetermined_columns.hpp"
+#include "start/algebraic.hpp"
+#include "start/linear_system.hpp"
 
 namespace tether::ida_projection {
 
 namespace {
 
-constexpr std::size_t kMostUnknowns = 2000;
 constexpr double kReach = 1e-4, kDiffer = 0.1;  // of y; of the slopes
 constexpr double kWrong = 1e-3;                 // of the row's largest entry
-constexpr const char* kKink =
-    "; its slopes to both sides differ there: a row with |.| or max has no derivative on the set, "
-    "write it without";
 
 }  // namespace
 
 bool RowFaults::may_search(std::size_t n) const {
-  return has_values(constraints_) && n <= kMostUnknowns;
+  return has_values(constraints_) && n <= static_cast<std::size_t>(kLargestProbed);
 }
 
 void RowFaults::reserve(std::size_t n) {
@@ -53,30 +50,10 @@ bool RowFaults::jacobian(double t, const std::vector<double>& y, const std::vect
 std::string RowFaults::wrong_entry(double t, const std::vector<double>& y) {
   try {
     const JacobianReport report = check_jacobian(constraints_, t, y, kWrong);
-    if (report.correct) return {};
-    return report.message + (kink(report.row, t, y).empty() ? "" : kKink);
+    return report.correct ? std::string() : report.message;
   } catch (const std::exception&) {  // g refuses a point nearby: nothing is known
     return {};
   }
-}
-
-std::string RowFaults::square(double t, const std::vector<double>& y,
-                              const std::vector<double>& WT) {
-  const std::size_t n = y.size();
-  if (!value(t, y, here_) || !jacobian(t, y, WT)) return {};
-  for (std::size_t i = 0; i < here_.size(); ++i) {
-    double square = 0.0;
-    for (std::size_t j = 0; j < n; ++j) square += std::pow(C_[i * n + j] * WT[j], 2);
-    if (!(square > 0.0) || here_[i] == 0.0) continue;
-    moved_ = y;
-    for (std::size_t j = 0; j < n; ++j)
-      moved_[j] -= here_[i] / square * C_[i * n + j] * WT[j] * WT[j];
-    if (value(t, moved_, sides_[0]) && std::abs(sides_[0][i] / here_[i] - 0.25) < 0.05)
-      return name(static_cast<int>(i)) +
-             " looks like a square: Newton's move leaves a fourth of g, as at a double root; "
-             "write it without the square";
-  }
-  return {};
 }
 
 std::string RowFaults::unkept(double t, const std::vector<double>& y, const std::vector<double>& yp,
@@ -103,25 +80,6 @@ std::string RowFaults::unkept_text(int row, const std::string& where, double rat
          "which F does not keep it";
 }
 
-std::string RowFaults::kink(int row, double t, std::vector<double> y) {
-  if (!value(t, y, here_)) return {};
-  const auto i = static_cast<std::size_t>(row);
-  double largest = 0.0, bend = 0.0;
-  for (double& unknown : y) {
-    const double present = unknown, reach = kReach * std::max(1.0, std::abs(present));
-    unknown = present + reach;
-    bool known = value(t, y, sides_[0]);
-    unknown = present - reach;
-    known = value(t, y, sides_[1]) && known;
-    unknown = present;
-    if (!known) return {};
-    const double ahead = sides_[0][i] - here_[i], behind = sides_[1][i] - here_[i];
-    largest = std::max({largest, std::abs(ahead), std::abs(behind)});
-    bend = std::max(bend, std::abs(ahead + behind));
-  }
-  return bend > kDiffer * largest ? name(row) + " at t = " + brief(t) + kKink : "";
-}
-
 // Two directions of no structure.
 std::string RowFaults::one_sided(const std::vector<int>& rows, double t,
                                  const std::vector<double>& y) {
@@ -139,7 +97,9 @@ std::string RowFaults::one_sided(const std::vector<int>& rows, double t,
       const double ahead = std::abs(sides_[0][i] - here_[i]);
       const double behind = std::abs(sides_[1][i] - here_[i]);
       if (ahead != behind && std::min(ahead, behind) <= kDiffer * std::max(ahead, behind))
-        return name(row) + " and its gradient vanish to one side of the set" + kKink;
+        return name(row) +
+               " and its gradient vanish to one side of the set; its slopes to both sides differ "
+               "there: a row with |.| or max has no derivative on the set, write it without";
     }
   }
   return {};

@@ -28,15 +28,9 @@ class RowFaults {
 
   /// Names the entry of C that check_jacobian finds wrong, with the reason where that is a kink.
   std::string wrong_entry(double t, const std::vector<double>& y);
-  /// Names a row with a double root, where Newton's move for it alone, in tolerances WT, leaves a
-  /// fourth of g.
-  std::string square(double t, const std::vector<double>& y, const std::vector<double>& WT);
   /// Names the row whose C y' + g_t is largest beside its terms, where it is no invariant.
   std::string unkept(double t, const std::vector<double>& y, const std::vector<double>& yp,
                      const std::vector<double>& WT);
-  /// Names the row if its slopes to both sides differ by much of the largest, with 2 N + 1
-  /// evaluations of g.
-  std::string kink(int row, double t, std::vector<double> y);
   /// Names one of the rows that holds one side of its set only: g_i is constant to one side along
   /// some direction, and moves to the other. Five evaluations of g for all of them.
   std::string one_sided(const std::vector<int>& rows, double t, const std::vector<double>& y);

@@ -3,7 +3,6 @@
 #include <limits>
 #include <ostream>
 #include <tether/ida_projection/statistics.hpp>
-#include <vector>
 
 #include "host/shortest.hpp"
 
@@ -11,60 +10,53 @@ namespace tether::ida_projection {
 
 namespace {
 
+using S = Statistics;
+
 struct Entry {
-  const char* label;   // of the table
-  const char* column;  // of the CSV file
-  double value;
-  bool integer;
+  const char* name;
+  long S::*count;
+  double S::*size = nullptr;
+
+  double value(const S& s) const { return count ? static_cast<double>(s.*count) : s.*size; }
+  void write(std::ostream& out, const S& s) const {
+    if (count)
+      out << s.*count;
+    else
+      out << std::setprecision(6) << std::scientific << s.*size << std::defaultfloat;
+  }
 };
-
-std::vector<Entry> entries(const Statistics& s) {
-  const auto count = [](const char* label, const char* column, long value) {
-    return Entry{label, column, static_cast<double>(value), true};
-  };
-  return {
-      count("solver calls", "solver_calls", s.solver_calls),
-      count("steps of IDA without the plugin", "steps_without_plugin", s.steps_without_plugin),
-      count("projections", "projections", s.projections),
-      count("already on the constraints", "skipped", s.skipped),
-      count("Newton moves", "iterations", s.iterations),
-      count("evaluations of g", "value_evaluations", s.value_evaluations),
-      count("evaluations of C", "jacobian_evaluations", s.jacobian_evaluations),
-      count("of both by one call", "joint_evaluations", s.joint_evaluations),
-      count("factorizations of C", "factorizations", s.factorizations),
-      count("factorizations of rows known to be independent", "refactorizations",
-            s.refactorizations),
-      count("extra corrector iterations", "extra_iterations", s.extra_iterations),
-      count("corrections repeated", "corrections_repeated", s.corrections_repeated),
-      count("refreshes of algebraic variables", "refreshes", s.refreshes),
-      count("evaluations of F by the plugin", "residual_evaluations", s.residual_evaluations),
-      count("factorizations with dropped rows", "rank_drops", s.rank_drops),
-      count("algebraic variables out of the error test", "untested", s.untested),
-      count("step smoothing begun", "smoothing_begun", s.smoothing_begun),
-      count("order limited", "order_limited", s.order_limited),
-      count("projections of sensitivities", "sensitivity_projections", s.sensitivity_projections),
-      count("failures: not converged", "not_converged", s.not_converged),
-      count("failures: move too long", "move_too_long", s.move_too_long),
-      count("moves capped", "moves_capped", s.moves_capped),
-      count("failures: rows contradict", "inconsistent", s.inconsistent),
-      count("failures: not finite", "not_finite", s.not_finite),
-      count("failures: callback, recoverable", "callback_recoverable", s.callback_recoverable),
-      count("failures: callback, fatal", "callback_fatal", s.callback_fatal),
-      count("failures of the corrector", "corrector_failures", s.corrector_failures),
-      {"largest |g| before", "largest_drift_before", s.largest_drift_before, false},
-      {"largest |g| after", "largest_drift_after", s.largest_drift_after, false},
-      {"largest move (tolerances)", "largest_move", s.largest_move, false},
-      {"mean move (tolerances)", "mean_move", s.mean_move, false},
-      {"time in the projection (s)", "seconds", s.seconds, false},
-  };
-}
-
-void write(std::ostream& out, const Entry& entry) {
-  if (entry.integer)
-    out << static_cast<long>(entry.value);
-  else
-    out << std::setprecision(6) << std::scientific << entry.value << std::defaultfloat;
-}
+constexpr Entry kEntries[] = {{"solver_calls", &S::solver_calls},
+                              {"steps_without_plugin", &S::steps_without_plugin},
+                              {"projections", &S::projections},
+                              {"skipped", &S::skipped},
+                              {"iterations", &S::iterations},
+                              {"value_evaluations", &S::value_evaluations},
+                              {"jacobian_evaluations", &S::jacobian_evaluations},
+                              {"joint_evaluations", &S::joint_evaluations},
+                              {"factorizations", &S::factorizations},
+                              {"refactorizations", &S::refactorizations},
+                              {"extra_iterations", &S::extra_iterations},
+                              {"corrections_repeated", &S::corrections_repeated},
+                              {"refreshes", &S::refreshes},
+                              {"residual_evaluations", &S::residual_evaluations},
+                              {"rank_drops", &S::rank_drops},
+                              {"untested", &S::untested},
+                              {"smoothing_begun", &S::smoothing_begun},
+                              {"order_limited", &S::order_limited},
+                              {"sensitivity_projections", &S::sensitivity_projections},
+                              {"not_converged", &S::not_converged},
+                              {"move_too_long", &S::move_too_long},
+                              {"moves_capped", &S::moves_capped},
+                              {"inconsistent", &S::inconsistent},
+                              {"not_finite", &S::not_finite},
+                              {"callback_recoverable", &S::callback_recoverable},
+                              {"callback_fatal", &S::callback_fatal},
+                              {"corrector_failures", &S::corrector_failures},
+                              {"largest_drift_before", nullptr, &S::largest_drift_before},
+                              {"largest_drift_after", nullptr, &S::largest_drift_after},
+                              {"largest_move", nullptr, &S::largest_move},
+                              {"mean_move", nullptr, &S::mean_move},
+                              {"seconds", nullptr, &S::seconds}};
 
 // The numbers together, in one line. A mean move of a tolerance is as long as an error
 // that IDA's test accepts: constraints that F keeps need less.
@@ -96,10 +88,10 @@ std::string verdict(const Statistics& s) {
 std::string Statistics::table() const {
   PlainText out;
   out << verdict(*this) << '\n';
-  for (const Entry& entry : entries(*this)) {
-    if (entry.value == 0) continue;
-    out << std::left << std::setw(34) << entry.label << " = ";
-    write(out, entry);
+  for (const Entry& entry : kEntries) {
+    if (entry.value(*this) == 0) continue;
+    out << std::left << std::setw(24) << entry.name << " = ";
+    entry.write(out, *this);
     out << '\n';
   }
   return out.str();
@@ -107,24 +99,21 @@ std::string Statistics::table() const {
 
 std::string Statistics::csv_header() {
   std::string line;
-  for (const Entry& entry : entries(Statistics{}))
-    line += (line.empty() ? "" : ",") + std::string(entry.column);
+  for (const Entry& entry : kEntries) line += (line.empty() ? "" : ",") + std::string(entry.name);
   return line;
 }
 
 double Statistics::number(const std::string& column) const {
-  for (const Entry& entry : entries(*this))
-    if (column == entry.column) return entry.value;
+  for (const Entry& entry : kEntries)
+    if (column == entry.name) return entry.value(*this);
   return std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string Statistics::csv_row() const {
   PlainText out;
-  const char* separator = "";
-  for (const Entry& entry : entries(*this)) {
-    out << separator;
-    write(out, entry);
-    separator = ",";
+  for (const Entry& entry : kEntries) {
+    if (&entry != kEntries) out << ',';
+    entry.write(out, *this);
   }
   return out.str();
 }

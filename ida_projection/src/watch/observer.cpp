@@ -1,0 +1,326 @@
+// Tether: what is noticed beside the step. SPDX-License-Identifier: BSD-3-Clause
+#include "watch/observer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "host/mechanisms.hpp"
+#include "host/shortest.hpp"
+#include "start/linear_system.hpp"
+#include "start/nearby_residuals.hpp"
+
+namespace tether::ida_projection {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kPartInTest = 0.5;      // tolerances: shorter moves fail no error test
+constexpr int kNameAfter = 4;            // failures in a row, of which IDA gives up after ten
+constexpr double kChange = 1e-3;         // of max(1, |y_j|), for differences
+constexpr std::size_t kMostNamed = 200;  // algebraic variables, each an evaluation of F
+
+// The candidate as the searches want it.
+struct Point {
+  std::vector<double> y, WT;
+
+  explicit Point(const Candidate& candidate)
+      : y(static_cast<std::size_t>(N_VGetLength(candidate.base))), WT(y) {
+    for (std::size_t j = 0; j < y.size(); ++j) {
+      const double w = candidate.weight_entries[j];
+      y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
+      WT[j] = w > 0.0 ? 1.0 / w : 0.0;
+    }
+  }
+  // Most unknowns below their tolerances: the error test cannot see them.
+  std::string large_tolerances() const {
+    std::size_t below = 0;
+    for (std::size_t j = 0; j < y.size(); ++j) below += std::abs(y[j]) < WT[j] ? 1U : 0U;
+    if (2 * below <= y.size()) return {};
+    return "; " + std::to_string(below) + " of " + std::to_string(y.size()) +
+           " unknowns are smaller than their tolerances: reduce atol";
+  }
+};
+
+}  // namespace
+
+void Observer::reset_statistics() {
+  statistics_ = Statistics{};
+  tally_ = Tally();
+}
+
+Statistics Observer::statistics() const {
+  Statistics s = statistics_;
+  s.steps_without_plugin = bypass_.unseen;
+  const long moved = s.projections - s.failures();
+  s.mean_move = moved > 0 ? tally_.move_sum / static_cast<double>(moved) : 0.0;
+  return s;
+}
+
+// Extrapolates y back over this step: exact for the first step, up to the curvature for later ones.
+void Observer::keep_point_before(const Candidate& candidate, OwnedVector& y) const {
+  if (candidate.base_entries == nullptr) return;
+  if (!y) y = OwnedVector(candidate.base);
+  N_VLinearSum(1.0, candidate.base, -ida_.step_size(), ida_.step().yp_predicted, y);
+}
+
+void Observer::check_form(const Candidate& candidate) {
+  const std::string doubts =
+      options_.id != nullptr ? variables_.doubts(candidate, corrector_) : std::string();
+  if (!doubts.empty()) report_.warn(Status::doubtful, doubts);
+  if (!variables_.high_index()) return;
+  const std::string found =
+      run_.start ? undetermined_multipliers(candidate, run_.start) : std::string();
+  if (!found.empty() && doubts.empty()) {
+    run_.undetermined = "the motion from the start is not determined: there " + found;
+    report_.warn(Status::doubtful, run_.undetermined);
+  }
+  const std::string index = too_high_index();
+  if (!index.empty()) report_.warn(Status::doubtful, index);
+}
+
+// Names algebraic variables that F does not determine at y (contiguous), because its derivatives
+// by them are dependent. Newton's matrix is then singular in every form of F: at singular
+// positions, and where joints are given twice. Names the rows of which the same is true, too.
+// Empty: there are none, or it is not known (method, section 13).
+std::string Observer::undetermined_multipliers(const Candidate& candidate, N_Vector y) {
+  if (candidate.base_entries == nullptr || !variables_.any()) return {};
+  const double* const entries = N_VGetArrayPointer(y);
+  const std::vector<double> at(entries, entries + N_VGetLength(y));
+  std::vector<double> change(at.size()), WT(at.size(), 1.0);
+  std::vector<int> algebraic;
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    const double w = candidate.weight_entries[j];
+    if (w > 0.0) WT[j] = 1.0 / w;
+    change[j] = std::max(w > 0.0 ? WT[j] : 0.0, kChange * std::max(1.0, std::abs(at[j])));
+    if (variables_.mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
+  }
+  if (algebraic.size() > kMostNamed) return {};
+  NearbyResiduals near(candidate, corrector_, statistics_, std::move(change), y);
+  Eigen::MatrixXd slopes(at.size(), algebraic.size());
+  for (std::size_t k = 0; k < algebraic.size(); ++k)
+    if (!near.slope(algebraic[k], NearbyResiduals::Of::values,
+                    slopes.col(static_cast<Eigen::Index>(k))))
+      return {};
+  const std::vector<char> found = undetermined_columns(std::move(slopes), false);
+  std::vector<int> free;
+  for (std::size_t k = 0; k < found.size(); ++k)
+    if (found[k]) free.push_back(algebraic[k]);
+  if (free.empty()) return {};
+  const std::vector<std::string> rows = faults_.dependent(candidate.t, at, WT);
+  return "F does not determine the algebraic variables " + listed(free) +
+         ": its derivatives by them depend on each other" +
+         (rows.empty() ? "" : ", as do the rows " + listed(rows)) +
+         "; start beside a singular position of a mechanism, and leave out joints that are given "
+         "twice";
+}
+
+// Names multipliers of too high an index, else returns an empty text. Close to a singular position
+// the multipliers are the cause that a user can find.
+std::string Observer::too_high_index() const {
+  if (variables_.index() <= 2 || !run_.undetermined.empty()) return {};
+  return "F is of index " + std::to_string(variables_.index()) +
+         ", and IDA integrates forms of index 2 at most: put the derivatives of equations without "
+         "y' in their place, and give these equations as rows";
+}
+
+std::string Observer::rounding_of_multipliers() const {
+  return variables_.high_index()
+             ? "; in forms of index 2 or more multipliers carry rounding divided by the step, "
+               "which may not allow this tolerance: try a larger one, or a form of index 1 or 0"
+             : "";
+}
+
+std::string Observer::explained(Status outcome, const std::string& text) const {
+  if (outcome == Status::callback_fatal && corrector_.stopped()) return corrector_.stop_text();
+  const std::string index = too_high_index();
+  return index.empty() ? text : text + "; " + index;
+}
+
+void Observer::corrector_failed(const Candidate& candidate, int flag) {
+  ++statistics_.corrector_failures;
+  report_.status = Status::corrector_failed;
+  const std::string index = too_high_index();
+  if (!index.empty())
+    report_.message = "IDA's corrector failed; " + index;
+  else if (variables_.high_index())
+    report_.message = "IDA's corrector failed" + rounding_of_multipliers() +
+                      (run_.undetermined.empty() ? "" : "; " + run_.undetermined);
+  if (flag <= 0 || candidate.base_entries == nullptr || corrector_.failures_in_row() != kNameAfter)
+    return;
+  report_.advise(variables_.derive(candidate, corrector_));
+  OwnedVector y;
+  keep_point_before(candidate, y);
+  const std::string found = undetermined_multipliers(candidate, y);
+  if (!found.empty())
+    run_.undetermined = report_.message = "before t = " + std::to_string(candidate.t) + " " + found;
+}
+
+void Observer::count_rejections(const Attempt& attempt) {
+  const bool moved = run_.moved > kPartInTest;
+  if (attempt.repeated) {
+    ++run_.rejections;
+    if (moved && std::exchange(run_.last_refused, attempt.steps) != attempt.steps)
+      ++run_.refused_steps;
+    return;
+  }
+  run_.moved_in_row = moved ? run_.moved_in_row + 1 : 0;
+  run_.standing = attempt.t + attempt.h != attempt.t ? 0 : run_.standing + 1;
+  if (attempt.steps < run_.window_begin + kWindow) return;
+  if (3 * run_.refused_steps > kWindow) run_.refused = true;
+  run_.window_begin = attempt.steps;
+  run_.refused_steps = 0;
+  if (!run_.refused) run_.rejections_before = run_.rejections;
+}
+
+bool Observer::begin_attempt(const Attempt& attempt, const Candidate& candidate) {
+  count_rejections(attempt);
+  const bool projected =
+      std::isfinite(std::exchange(run_.moved, std::numeric_limits<double>::infinity()));
+  if (attempt.accepted && projected && options_.progress) {
+    run_.progress.steps = attempt.steps;
+    std::string ignored;
+    guarded([&] { return options_.progress(run_.progress), 0; }, ignored);
+  }
+  if (run_.standing >= kWindow) {  // steps shorter than the rounding of t
+    report_.warn(Status::collapsed, "t stands at " + brief(attempt.t) +
+                                        ": steps are shorter than its rounding" +
+                                        rounding_of_multipliers());
+    return false;
+  }
+  const bool false_row = first_steps_.false_row_found();
+  const bool collapsed = run_.refused || (false_row && run_.moved_in_row >= 5 * kWindow);
+  if (!collapsed || report_.warning() == Status::collapsed) return true;
+  const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
+  const std::string text = cause(attempt, candidate, doubt);
+  report_.warn(Status::collapsed, text,
+               doubt.empty() ? text : text.substr(0, text.rfind("; " + doubt)));
+  return !false_row;
+}
+
+// Why most steps are rejected, found at the corrector's point, where y' = yppred + cj ycor
+// satisfies F. `doubt`: a cause that was found before.
+std::string Observer::cause(const Attempt& attempt, const Candidate& candidate,
+                            const std::string& doubt) {
+  std::string text = run_.refused ? "IDA rejected " +
+                                        std::to_string(run_.rejections - run_.rejections_before) +
+                                        " attempts in the last " + std::to_string(kWindow) +
+                                        " accepted steps before t = " + brief(attempt.t)
+                                  : "each of the last " + std::to_string(run_.moved_in_row) +
+                                        " steps before t = " + brief(attempt.t) +
+                                        " was moved by about what the error test allows";
+  if (variables_.all())
+    text +=
+        "; the id vector calls every variable algebraic: differential ones have to be 1 "
+        "(Options::id)";
+  std::string row = doubt;
+  if (candidate.base_entries != nullptr) {
+    const Point at(candidate);
+    text += at.large_tolerances();
+    if (faults_.may_search(at.y.size())) {
+      const std::string entry = faults_.wrong_entry(candidate.t, at.y);
+      if (!entry.empty()) row = "check_jacobian finds there: " + entry;
+      if (row.empty()) {
+        std::vector<double> yp(at.y);
+        for (std::size_t j = 0; j < yp.size(); ++j)
+          yp[j] = candidate.predicted_rate[j] + candidate.cj * candidate.correction_entries[j];
+        row = faults_.unkept(candidate.t, at.y, yp, at.WT);
+      }
+      faults_.pass_end_to(corrector_);
+    }
+  }
+  if (row.empty()) row = "check the rows with check_jacobian, the id vector and the tolerances";
+  return text + "; " + row;
+}
+
+// If moves do not converge C is wrong, as a rule; the candidate is where they have led, and y' need
+// not fulfil F there. Looked for once in a step, and only if it is printed.
+std::string Observer::suspicion(const Attempt& attempt, const Candidate& candidate,
+                                Status outcome) {
+  if (outcome != Status::not_converged || !report_.prints_failures(attempt.steps) ||
+      candidate.base_entries == nullptr)
+    return {};
+  if (std::exchange(run_.suspected, attempt.steps) == attempt.steps) return run_.suspicion;
+  const Point at(candidate);
+  const std::string entry =
+      faults_.may_search(at.y.size()) ? faults_.wrong_entry(candidate.t, at.y) : std::string();
+  run_.suspicion = entry.empty() ? at.large_tolerances()  // any row bends over these
+                                 : "; check_jacobian finds there: " + entry;
+  return run_.suspicion;
+}
+
+void Observer::skipped(const Move& measured) {
+  ++statistics_.skipped;
+  for (double* largest : {&statistics_.largest_drift_before, &statistics_.largest_drift_after})
+    *largest = std::max(*largest, measured.drift_before);
+}
+
+void Observer::begin_move() {
+  if (tally_.attempts++ % FirstSteps::kEvery == 0) move_begun_ = Clock::now();
+}
+
+void Observer::after_move(const Attempt& attempt, const Candidate& candidate, const Move& move,
+                          N_Vector corrected, Mover& mover) {
+  Statistics& s = statistics_;
+  const bool good = move.status == Status::success;
+  if ((tally_.attempts - 1) % FirstSteps::kEvery == 0) {
+    const double left = mover.remaining_drift(candidate);
+    if (good) s.largest_drift_after = std::max(s.largest_drift_after, left);
+    s.seconds += std::chrono::duration<double>(Clock::now() - move_begun_).count() *
+                 static_cast<double>(tally_.attempts == 1 ? 1 : FirstSteps::kEvery);
+  }
+  ++(move.not_needed ? s.skipped : s.projections);
+  if (move.capped) ++s.moves_capped;
+  if (!good) return;
+  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
+  s.largest_move = std::max(s.largest_move, move.length);
+  tally_.move_sum += move.length;
+  run_.moved = move.length;
+  run_.progress = {attempt.t, attempt.h, attempt.order, move.drift_before, move.length, 0};
+  if (attempt.steps == 0) check_start(attempt, move);
+  if (attempt.repeated || report_.warning() != Status::success ||
+      !FirstSteps::are_checked(attempt.steps) || !in_use(Mechanism::false_row_watch))
+    return;
+  const std::string doubt =
+      first_steps_.check(candidate, attempt, corrected, variables_, mover, corrector_);
+  if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
+  if (report_.advice.empty()) report_.advice = first_steps_.idle_row();
+}
+
+// From a start off the constraints moves do not shrink with the step. Above Advanced::largest_move
+// they are refused by name, below IDA's error test refuses them, with words of its own.
+void Observer::check_start(const Attempt& attempt, const Move& move) {
+  const double before = std::exchange(run_.first_move, move.length);
+  const bool stays = attempt.repeated && move.length > 1.0 && move.length > 0.5 * before;
+  run_.refused_starts = stays ? run_.refused_starts + 1 : 0;
+  if (run_.refused_starts == kNameAfter)
+    report_.warn(Status::doubtful,
+                 "IDA's error test refuses the first step, however short it is: the start is " +
+                     brief(move.length) +
+                     " tolerances off the constraints; call make_consistent first");
+}
+
+// After an attempt IDA has accepted at most one step that the plugin has not heard of: IDA's count
+// has to be the one at the last attempt, or one more, or less after IDAReInit.
+bool Observer::bypassed(long seen, bool initialized) {
+  long steps = 0;
+  if (bypass_.at_attach >= 0 && lifetime_.alive() && IDAGetNumSteps(ida_.mem(), &steps) == 0) {
+    const long least = initialized ? seen : bypass_.at_attach;
+    const long most = initialized ? seen + 1 : bypass_.at_attach;
+    if (steps > most) bypass_.unseen = steps - most;
+    if (steps < least && steps > 0) bypass_.unseen = steps;
+  }
+  if (bypass_.unseen > 0 && bypass_.text.empty()) {
+    bypass_.text =
+        "IDA took " + std::to_string(bypass_.unseen) +
+        " steps without the plugin, which projected none of them: another nonlinear solver was "
+        "attached after it; make the Projection last, or hand that solver over in "
+        "Options::nonlinear_solver";
+    report_.print(bypass_.text);
+  }
+  return bypass_.unseen > 0;
+}
+
+}  // namespace tether::ida_projection

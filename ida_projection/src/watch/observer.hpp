@@ -1,0 +1,115 @@
+// Tether: what is noticed beside the step: statistics, doubts and their causes.
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <limits>
+#include <string>
+
+#include "host/ida_lifetime.hpp"
+#include "step/attempt.hpp"
+#include "watch/first_steps.hpp"
+#include "watch/report.hpp"
+
+namespace tether::ida_projection {
+
+/// Counts, measures and explains. It never steers a step, but ends a run that stands still, or in
+/// which a false row takes every step about as far as IDA's error test allows.
+class Observer {
+ public:
+  Observer(const Constraints& constraints, const Options& options, Statistics& statistics,
+           Report& report, const Ida& ida, const IdaLifetime& lifetime, Corrector& corrector,
+           AlgebraicVariables& variables)
+      : options_(options),
+        statistics_(statistics),
+        report_(report),
+        ida_(ida),
+        lifetime_(lifetime),
+        corrector_(corrector),
+        variables_(variables),
+        faults_(constraints, statistics),
+        first_steps_(constraints, faults_) {}
+
+  void attached() { bypass_.at_attach = ida_.steps(); }
+  void reset() { run_ = Run(), first_steps_.reset(); }  ///< a new run starts
+  void reset_statistics();
+  Statistics statistics() const;
+
+  /// Keeps the first y of the run, of contiguous vectors.
+  void begin_run(const Candidate& candidate) { keep_point_before(candidate, run_.start); }
+  /// Names errors of the id vector, multipliers that F does not determine at the start, and too
+  /// high an index. The index is known.
+  void check_form(const Candidate& candidate);
+  /// Before the move of an attempt. False: the run is hopeless, the report's warning says why.
+  bool begin_attempt(const Attempt& attempt, const Candidate& candidate);
+  /// An attempt that needed no move.
+  void skipped(const Move& measured);
+  /// Before and after a move. Reading the clock costs as much as a small projection: the first one
+  /// is timed, which finds out what the others keep, and every 16th for the others. These see what
+  /// g is left, too.
+  void begin_move();
+  void after_move(const Attempt& attempt, const Candidate& candidate, const Move& move,
+                  N_Vector corrected, Mover& mover);
+
+  /// The message of a failed attempt, with causes where they are to be printed.
+  std::string explained(Status outcome, const std::string& text) const;
+  std::string suspicion(const Attempt& attempt, const Candidate& candidate, Status outcome);
+  void corrector_failed(const Candidate& candidate, int flag);
+
+  /// Notices another nonlinear solver in the plugin's place, by IDA's count of steps. `seen`:
+  /// accepted before the last attempt; `initialized`: IDA has initialised the plugin. True: IDA
+  /// took steps without it, and the text says so once.
+  bool bypassed(long seen, bool initialized);
+  const std::string& bypass_text() const { return bypass_.text; }
+
+ private:
+  static constexpr long kWindow = 200;  // accepted steps, in which most attempts fail
+
+  struct Run {
+    OwnedVector start;         // its first y, of contiguous vectors
+    std::string undetermined;  // multipliers at the start, or where correctors fail
+    double first_move = 0.0;   // of the last attempt at the first step, in tolerances
+    int refused_starts = 0;    // attempts at it with a move that does not shrink
+    double moved = std::numeric_limits<double>::infinity();  // in the last attempt; inf: it failed
+    Progress progress;                           // what the caller is told once it is accepted
+    long moved_in_row = 0, standing = 0;         // accepted steps
+    long rejections = 0, rejections_before = 0;  // attempts that IDA repeated
+    long window_begin = 0;                       // accepted steps when they were last counted
+    long refused_steps = 0, last_refused = -1;   // of these, steps with a rejection
+    bool refused = false;                        // most steps of a stretch
+    long suspected = -1;                         // the step that was diagnosed
+    std::string suspicion;                       // found then
+  };
+  struct Tally {
+    double move_sum = 0.0;
+    long attempts = 0;  // since moves began
+  };
+  struct Bypass {
+    long at_attach = -1, unseen = 0;
+    std::string text;
+  };
+
+  void keep_point_before(const Candidate& candidate, OwnedVector& y) const;
+  void count_rejections(const Attempt& attempt);
+  std::string cause(const Attempt& attempt, const Candidate& candidate, const std::string& doubt);
+  std::string undetermined_multipliers(const Candidate& candidate, N_Vector y);
+  std::string too_high_index() const;
+  std::string rounding_of_multipliers() const;
+  void check_start(const Attempt& attempt, const Move& move);
+
+  const Options& options_;
+  Statistics& statistics_;
+  Report& report_;
+  const Ida& ida_;
+  const IdaLifetime& lifetime_;
+  Corrector& corrector_;
+  AlgebraicVariables& variables_;
+  RowFaults faults_;
+  FirstSteps first_steps_;
+  Run run_;
+  Tally tally_;
+  Bypass bypass_;
+  std::chrono::steady_clock::time_point move_begun_;
+};
+
+}  // namespace tether::ida_projection
