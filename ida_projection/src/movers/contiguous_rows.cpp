@@ -177,9 +177,7 @@ class ContiguousRows final : public RowsAt {
   }
   // Few rows make no rough moves. At singular positions, where rows are nearly dependent, F
   // responds to any move, stiff or not.
-  bool may_use_levels() const override {
-    return count() > kFew && factors != Factors::of_some_rows;
-  }
+  bool may_use_levels() const override { return count() > kFew && factors == Factors::of_all_rows; }
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override {
     if (!rows_.structured() || factors == Factors::none) return false;
     for (std::vector<double>* each : {&out.rate, &out.terms, &out.tolerance, &out.size})
