@@ -10,8 +10,10 @@ namespace tether::scene {
 constexpr std::size_t kMostListed = 100000;
 /// Bytes of a scene, and of a surface or an XML file.
 constexpr std::size_t kLargestScene = std::size_t{256} << 20, kLargestPart = std::size_t{64} << 20;
-/// Bytes of a wrong value that its message shows.
-constexpr std::size_t kLongestShown = 60;
+/// Bytes of a wrong value that its message shows, and of a wrong key that gets a suggestion.
+constexpr std::size_t kLongestShown = 64;
+/// Names that a message suggests.
+constexpr std::size_t kMostSuggested = 30;
 /// Things of one kind that are told one by one.
 constexpr std::size_t kMostNamed = 5;
 /// Bodies that have columns in a table.

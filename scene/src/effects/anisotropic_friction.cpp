@@ -6,35 +6,24 @@
 //   (x_1 / mu_1)^2 + (x_2 / mu_2)^2 <= x_n^2,   the slip is along the normal of the ellipse
 //
 // which is Coulomb's law for the tangents t_k mu_k / mu, mu the larger of both.
-
 #include "mechanics/effect.hpp"
 #include "numbers.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
-namespace {
-
-class AnisotropicFriction : public Effect {
- public:
-  void body_fields(const files::Form& form, Body& body) const override {
-    if (form.in() && !form.in()->has("friction_axis")) return;
-    if (form.in()) body.friction_axis = Vector3d::UnitX();
-    if (body.friction_axis) form.direction("friction_axis", *body.friction_axis);
+struct AnisotropicFriction : Effect {
+  void body_fields(const Form& form, Body& body) const override {
+    form.direction("friction_axis", body.friction_axis);
   }
-  void pair_fields(const files::Form& form, Pair& pair) const override {
+  void pair_fields(const Form& form, Pair& pair) const override {
     constexpr const char* kKey = "friction_across";
-    if (form.in() && !form.in()->has(kKey)) return;
-    if (form.in()) pair.friction_across = 0;
-    if (!pair.friction_across) return;
-    coefficient(form, kKey, *pair.friction_across, {});
-    if (!form.in()) return;
+    coefficient(form, kKey, pair.friction_across);
+    if (!form.in() || !pair.friction_across) return;
     if (!pair.touch) form.in()->wrong(kKey, "is of a contact, and touch = false has none");
     if (pair.first == pair.second && !pair.first.empty())
       form.in()->wrong(kKey, "is of two materials: bodies of the first one have the friction_axis");
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     std::set<std::string> with_axis;
     for (const Pair& pair : scene.pairs)
       if (pair.friction_across) with_axis.insert(pair.first);
@@ -47,16 +36,15 @@ class AnisotropicFriction : public Effect {
                           "first");
     }
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = count_if(scene.pairs, [](const Pair& each) { return each.is_elliptic(); });
-    if (count > 0) lines.push_back({"elliptic friction", counted(count, "pair") + " of materials"});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "elliptic friction",
+              count_if(scene.pairs, [](const Pair& each) { return each.is_elliptic(); }), "pair",
+              " of materials");
   }
   void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
     meeting.friction_across = pair.friction_across;
   }
 };
-
-}  // namespace
 
 TETHER_EFFECT(anisotropic_friction, AnisotropicFriction)
 

@@ -1,29 +1,20 @@
 // Tether: cables through rings. SPDX-License-Identifier: BSD-3-Clause
 //
-// With L the sum of the distances from point to point, and s = L - rest - winch t:
-//
-//   tension T = max(0, k s + c ds/dt) where s > 0, else 0,
-//   potential k s^2 / 2 where s > 0,
+// With the tension T of cable.hpp: potential k s^2 / 2 where s > 0,
 //   power -(T - k s) dL/dt - k s winch of what has no potential
-#include "cable_item.hpp"
+#include "cable.hpp"
 #include "list.hpp"
-#include "tension.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
-class CableForces : public Force {
- public:
+struct CableForces : Force {
   CableForces(const Scene& scene, const Bodies& bodies) {
     for (std::size_t i = 0; i < scene.springs.size(); ++i) {
       const Spring& each = scene.springs[i];
       if (!each.cable) continue;
-      CableItem item(each, i, bodies);
-      works_ = works_ || item.damping > 0 || item.winch != 0;
-      items_.push_back(std::move(item));
+      items_.emplace_back(each, i, bodies);
     }
   }
   const char* name() const override { return "cables"; }
@@ -76,7 +67,9 @@ class CableForces : public Force {
           bodies, each, CableTension(each, bodies).elastic,
           [&](int body, const Wrench<double>& wrench) { put_gradient(bodies, body, wrench, row); });
   }
-  bool has_power() const override { return works_; }
+  bool has_power() const override {
+    return any_of(items_, [](const CableItem& s) { return s.damping > 0 || s.winch != 0; });
+  }
   double power(const Bodies& bodies) const override {
     double sum = 0;
     for (const CableItem& each : items_) {
@@ -173,12 +166,10 @@ class CableForces : public Force {
   static void add_slopes(const Bodies& bodies, const CableItem& each, int row, double factor,
                          JacobianBlocks& J, const Of& of) {
     for (std::size_t p = 0; p < each.points.size(); ++p)
-      if (const int body = each.points[p].body; bodies.moves(body))
-        J.add_directions(row, bodies.inertia[at(body)].slot, of(p), 0, factor);
+      J.add_body(row, bodies, each.points[p].body, of(p), 0, factor);
   }
 
   std::vector<CableItem> items_;
-  bool works_ = false;
 };
 
 /// Bodies and places of its ends and rings, in order.
@@ -191,33 +182,30 @@ std::vector<Ring> cable_points(const Spring& spring) {
 
 constexpr std::size_t kMostPoints = 1000;
 
-class CableEffect : public Effect {
- public:
-  void fields(const files::Form& root, Scene& scene) const override {
-    const auto one = [](const files::Form& form, Spring& spring) {
+struct CableEffect : Effect {
+  void fields(const Form& root, Scene& scene) const override {
+    const auto one = [](const Form& form, Spring& spring) {
       if (form.in()) spring.cable.emplace();
       form.name("cable", spring.name);
       const bool whole = places(form, spring);
       form.require("stiffness", "a number > 0 (N/m)");
-      form.number("stiffness", spring.stiffness, files::kPositive, kStiffness);
-      form.number("damping", spring.damping, files::kNotNegative, kDamping);
-      form.number("length", spring.rest, files::kPositive, kMetres);
-      form.number("winch", spring.cable->winch, files::kAny, kSpeed);
+      form.number("stiffness", spring.stiffness, kPositive, kStiffness);
+      form.number("damping", spring.damping, kNotNegative, kDamping);
+      form.number("length", spring.rest, kPositive, kMetres);
+      form.number("winch", spring.cable->winch, kAny, kSpeed);
       for (const Effect* each : all()) each->cable_fields(form, *spring.cable);
       return whole;
     };
-    root.each("cable", scene.springs, one,
-              [](const Spring& each) { return each.cable.has_value(); });
+    root.each("cable", scene.springs, one, is_cable);
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     std::set<std::string> names;
     for (const Spring& each : scene.springs)
       if (!each.cable) names.insert(each.name);
     for (const Spring& each : scene.springs) {
       if (!each.cable) continue;
       const std::string path = fmt::format("cable \"{}\"", each.name);
-      if (!names.insert(each.name).second)
-        report.add(each.place, path + ": name", "", "another cable or spring has it already");
+      check_name(each, "cable", names, report);
       const std::vector<Ring> points = cable_points(each);
       double length = 0;
       bool apart = true, pulls = false;
@@ -238,16 +226,15 @@ class CableEffect : public Effect {
                    fmt::format("leaves no length before the end, {} s", scene.end));
     }
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     int cables = 0;
     std::size_t rings = 0;
     for (const Spring& each : scene.springs) {
       cables += each.cable.has_value();
       if (each.cable) rings += each.cable->rings.size();
     }
-    if (cables == 0) return;
-    const std::string through = rings > 0 ? " through " + counted(rings, "ring") : "";
-    lines.push_back({"cables", counted(cables, "cable") + through});
+    add_count(lines, "cables", cables, "cable",
+              rings > 0 ? " through " + counted(rings, "ring") : "");
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
     for (const Spring& spring : scene.springs) {
@@ -277,19 +264,16 @@ class CableEffect : public Effect {
     }
   }
   bool does_work(const Scene& scene) const override {
-    for (const Spring& each : scene.springs)
-      if (each.cable && each.cable->winch != 0) return true;
-    return false;
+    return any_of(scene.springs,
+                  [](const Spring& each) { return each.cable && each.cable->winch != 0; });
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    const bool any =
-        any_of(scene.springs, [](const Spring& each) { return each.cable.has_value(); });
-    return any ? std::make_unique<CableForces>(scene, bodies) : nullptr;
+    return any_of(scene.springs, is_cable) ? std::make_unique<CableForces>(scene, bodies) : nullptr;
   }
 
  private:
   /// The points and their bodies, from end to end; false: they are missing or wrong.
-  static bool places(const files::Form& form, Spring& spring) {
+  static bool places(const Form& form, Spring& spring) {
     if (form.in()) return read_places(*form.in(), *form.reader(), spring);
     std::vector<int> bodies;
     std::vector<Vector3d> points;
@@ -298,15 +282,15 @@ class CableEffect : public Effect {
       points.push_back(each.at);
     }
     if (form.out()) {
-      form.out()->raw("bodies", files::names(form.scene(), bodies));
-      form.out()->raw("at", files::toml(points), "m");
+      form.out()->raw("bodies", names(form.scene(), bodies));
+      form.out()->raw("at", toml(points), "m");
     } else {
       for (Vector3d& each : points) each /= form.units()->length;
       put_places(bodies, points, spring);
     }
     return true;
   }
-  static bool read_places(files::Fields& in, const files::Reader& r, Spring& spring) {
+  static bool read_places(Fields& in, const Reader& r, Spring& spring) {
     const std::vector<int> bodies = r.several_bodies(
         in, 2, kMostPoints, "names of bodies, one for each point; \"world\" is the ground");
     if (!in.has("at")) in.missing("at", "points from end to end, world, m");

@@ -1,5 +1,5 @@
 // Tether: friction of cables at rings and pulleys. SPDX-License-Identifier: BSD-3-Clause
-#include "capstan.hpp"
+#include "cable.hpp"
 
 #include <tether/linalg/pi.hpp>
 
@@ -51,11 +51,10 @@ namespace {
 
 bool rubs(const Spring& spring) { return spring.cable && spring.cable->capstan; }
 
-class CapstanEffect : public Effect {
- public:
-  void cable_fields(const files::Form& form, Cable& cable) const override {
+struct CapstanEffect : Effect {
+  void cable_fields(const Form& form, Cable& cable) const override {
     const int rings = static_cast<int>(cable.rings.size());
-    form.table("capstan", cable.capstan, [&](const files::Form& in, Capstan& capstan) {
+    form.table("capstan", cable.capstan, [&](const Form& in, Capstan& capstan) {
       in.count("ring", capstan.ring, 1, std::max(rings, 1));
       if (in.in() && rings == 0)
         in.in()->wrong("ring", "the cable has no ring between its ends to rub at");
@@ -63,12 +62,12 @@ class CapstanEffect : public Effect {
       in.require("friction", "a coefficient");
       coefficient(in, "friction", capstan.friction, {});
       wrap(in, capstan.wrap);
-      in.number("radius", capstan.radius, files::kNotNegative, kMetres);
+      in.number("radius", capstan.radius, kNotNegative, kMetres);
       if (in.in() ? in.in()->has("axis") : capstan.radius > 0) in.direction("axis", capstan.axis);
       if (in.in() && capstan.radius > 0) in.require("axis", "of the pulley, world axes at t = 0");
     });
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     for (const Spring& each : scene.springs)
       if (rubs(each) && each.cable->capstan->radius > 0 &&
           at(each.cable->capstan->ring) <= each.cable->rings.size() &&
@@ -77,9 +76,8 @@ class CapstanEffect : public Effect {
                    fmt::format("{}", each.cable->capstan->radius),
                    "is of a pulley that turns, and the body of its ring is fixed");
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    if (const auto count = count_if(scene.springs, rubs); count > 0)
-      lines.push_back({"capstan friction", counted(count, "cable")});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "capstan friction", count_if(scene.springs, rubs), "cable");
   }
   bool has_joint_laws(const Scene& scene) const override { return any_of(scene.springs, rubs); }
   void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
@@ -92,8 +90,8 @@ class CapstanEffect : public Effect {
   }
 
  private:
-  static void wrap(const files::Form& form, std::optional<double>& wrap) {
-    files::Fields* const in = form.in();
+  static void wrap(const Form& form, std::optional<double>& wrap) {
+    Fields* const in = form.in();
     if (in && !in->has("wrap_deg") && !in->has("wrap_rad")) return;
     if (in) wrap = 0;
     if (wrap) form.angle("wrap_", *wrap);

@@ -6,17 +6,13 @@
 //
 // A body is attracted as if all of its mass were at its centre; gravity_gradient.cpp has what its
 // extent adds.
-
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
-class CentralGravityForce : public Force {
- public:
+struct CentralGravityForce : Force {
   CentralGravityForce(std::vector<CentralGravity> centres, const Bodies& bodies)
       : centres_(std::move(centres)) {
     for (int b = 0; b < bodies.world(); ++b)
@@ -69,20 +65,19 @@ class CentralGravityForce : public Force {
   std::vector<int> bodies_;  // those that move
 };
 
-class CentralGravityEffect : public Effect {
- public:
-  void fields(const files::Form& root, Scene& scene) const override {
+struct CentralGravityEffect : Effect {
+  void fields(const Form& root, Scene& scene) const override {
     root.each("central_gravity", scene.central_gravity,
-              [](const files::Form& form, CentralGravity& centre) {
+              [](const Form& form, CentralGravity& centre) {
                 form.vector("at", centre.at, kMetres);
                 form.require("gravitational_parameter", "G times the mass of the centre, m^3/s^2");
-                form.number("gravitational_parameter", centre.gravitational_parameter,
-                            files::kNotNegative, {"m^3/s^2", 0, 3, -2});
+                form.number("gravitational_parameter", centre.gravitational_parameter, kNotNegative,
+                            {"m^3/s^2", 0, 3, -2});
                 form.flag("gradient", centre.gradient);
                 return true;
               });
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     for (const CentralGravity& centre : scene.central_gravity)
       for (const Body& body : scene.bodies)
         if (!body.fixed && body.position == centre.at)
@@ -92,9 +87,8 @@ class CentralGravityEffect : public Effect {
                                  "attraction is infinite there",
                                  body.name));
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const std::size_t count = scene.central_gravity.size();
-    if (count > 0) lines.push_back({"central gravity", counted(count, "centre")});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "central gravity", scene.central_gravity.size(), "centre");
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
     each(scene, [&](double distance, double) { length.take(distance); });

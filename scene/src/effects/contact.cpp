@@ -2,50 +2,75 @@
 //
 // The stepping engine takes contact from tether::contact. A pair that no table names is an error
 // where bodies of it can touch: nothing is mixed from single materials.
-
 #include "bounds.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
 using Materials = std::pair<std::string, std::string>;
 
-Materials ordered(const std::string& a, const std::string& b) { return std::minmax(a, b); }
-
-void read_pair(files::Fields& in, const files::Reader& r, Pair& pair) {
-  constexpr const char* kAllowed = "two names of materials, e.g. [\"card\", \"table\"]";
-  using Kind = files::Value::Kind;
-  const files::Value* between = in.find("between");
-  if (between == nullptr) return in.missing("between", kAllowed);
-  if (between->kind() != Kind::array || between->items().size() != 2 ||
-      between->items()[0].kind() != Kind::text || between->items()[1].kind() != Kind::text)
-    return in.wrong("between", std::string("must be ") + kAllowed);
-  pair.first = between->items()[0].text();
-  pair.second = between->items()[1].text();
-  for (const std::string& name : {pair.first, pair.second})
-    if (r.materials.count(name) == 0)
-      return in.wrong("between", fmt::format("no body has the material \"{}\"{}", name,
-                                             r.hint_of(name, r.materials)));
+void read_pair(Fields& in, const Reader& r, Pair& pair) {
+  const std::vector<std::string> both =
+      r.names(in, "between", 2, 2, "two names of materials, e.g. [\"card\", \"table\"]",
+              "no body has the material", r.materials);
+  if (both.empty()) return;
+  pair.first = both[0];
+  pair.second = both[1];
   pair.touch = in.flag("touch", pair.touch);
   for (const char* key : {"friction", "restitution"})
     if (!pair.touch && in.has(key)) in.wrong(key, "is of a contact, and touch = false has none");
 }
 
-class ContactEffect : public Effect {
- public:
-  void pair_fields(const files::Form& form, Pair& pair) const override {
+struct ContactEffect : Effect {
+  void pair_fields(const Form& form, Pair& pair) const override {
     if (form.in()) return read_pair(*form.in(), *form.reader(), pair);
     if (!form.out()) return;
-    form.out()->raw("between",
-                    fmt::format("[{}, {}]", files::toml(pair.first), files::toml(pair.second)));
+    form.out()->field("between", std::array{pair.first, pair.second});
     if (!pair.touch) form.flag("touch", pair.touch);
   }
-  void check(const Scene& scene, files::Report& report) const override;
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void check(const Scene& scene, Report& report) const override {
+    if (scene.pairs.empty()) return;  // nothing touches
+    std::set<Materials> named;
+    for (const Pair& pair : scene.pairs)
+      if (!named.insert(std::minmax(pair.first, pair.second)).second)
+        report.add(pair.place, "pair: between", toml(std::array{pair.first, pair.second}),
+                   "another [[pair]] has the same materials");
+
+    // How many bodies have a material, and how many of these move.
+    struct Count {
+      int all = 0, moving = 0;
+      Place place;
+    };
+    std::map<std::string, Count> materials;
+    for (const Body& body : scene.bodies) {
+      if (body.material.empty()) continue;
+      Count& of = materials[body.material];
+      if (of.all == 0) of.place = body.place;
+      ++of.all;
+      of.moving += !body.fixed;
+    }
+    // One of the two must move. Every pair here is named in the file or is a problem, so that the
+    // work ends with the longer of the file and the report.
+    for (const auto& [first, a] : materials) {
+      if (a.moving == 0) continue;
+      for (const auto& [second, b] : materials) {
+        if (report.full()) return;
+        if ((b.moving > 0 && second < first) || (first == second && a.all < 2)) continue;
+        const Materials both = std::minmax(first, second);
+        const auto& [low, high] = both;
+        if (named.count(both) > 0) continue;
+        report.add(
+            std::max(a.place.line, b.place.line) == a.place.line ? a.place : b.place, "material",
+            fmt::format("\"{}\"", high),
+            fmt::format("bodies of \"{0}\" and \"{1}\" can touch, but no [[pair]] says between "
+                        "= [\"{0}\", \"{1}\"] (nothing is mixed from single materials)",
+                        low, high));
+      }
+    }
+  }
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     const auto count = count_if(scene.pairs, [](const Pair& pair) { return pair.touch; });
     if (count == 0) return;
     std::size_t triangles = 0;
@@ -75,47 +100,6 @@ class ContactEffect : public Effect {
     }
   }
 };
-
-void ContactEffect::check(const Scene& scene, files::Report& report) const {
-  if (scene.pairs.empty()) return;  // nothing touches
-  std::set<Materials> named;
-  for (const Pair& pair : scene.pairs)
-    if (!named.insert(ordered(pair.first, pair.second)).second)
-      report.add(pair.place, "pair: between",
-                 fmt::format("[\"{}\", \"{}\"]", pair.first, pair.second),
-                 "another [[pair]] has the same materials");
-
-  // How many bodies have a material, and how many of these move.
-  struct Count {
-    int all = 0, moving = 0;
-    Place place;
-  };
-  std::map<std::string, Count> materials;
-  for (const Body& body : scene.bodies) {
-    if (body.material.empty()) continue;
-    Count& of = materials[body.material];
-    if (of.all == 0) of.place = body.place;
-    ++of.all;
-    of.moving += !body.fixed;
-  }
-  // One of the two must move. Every pair here is named in the file or is a problem, so that the
-  // work ends with the longer of the file and the report.
-  for (const auto& [first, a] : materials) {
-    if (a.moving == 0) continue;
-    for (const auto& [second, b] : materials) {
-      if (report.full()) return;
-      if ((b.moving > 0 && second < first) || (first == second && a.all < 2)) continue;
-      const auto [low, high] = ordered(first, second);
-      if (named.count({low, high}) > 0) continue;
-      report.add(
-          std::max(a.place.line, b.place.line) == a.place.line ? a.place : b.place, "material",
-          fmt::format("\"{}\"", high),
-          fmt::format("bodies of \"{0}\" and \"{1}\" can touch, but no [[pair]] says between "
-                      "= [\"{0}\", \"{1}\"] (nothing is mixed from single materials)",
-                      low, high));
-    }
-  }
-}
 
 }  // namespace
 

@@ -11,8 +11,6 @@
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
 struct Dragged {
@@ -20,11 +18,12 @@ struct Dragged {
   Drag drag;
 };
 
+bool has_drag(const Body& body) { return body.drag.has_value(); }
+
 /// Force by speed, N s/m.
 double resistance(const Drag& drag, double speed) { return drag.linear + drag.quadratic * speed; }
 
-class DragForce : public Force {
- public:
+struct DragForce : Force {
   DragForce(std::vector<Dragged> bodies, const Vector3d& wind)
       : bodies_(std::move(bodies)), wind_(wind) {}
   const char* name() const override { return "drag"; }
@@ -103,36 +102,32 @@ class DragForce : public Force {
   Vector3d wind_;
 };
 
-class DragEffect : public Effect {
- public:
-  void scene_fields(const files::Form& form, Scene& scene) const override {
+struct DragEffect : Effect {
+  void scene_fields(const Form& form, Scene& scene) const override {
     form.vector("wind", scene.wind, kSpeed);
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     if (scene.wind && !does_work(scene))
       report.add({scene.file, 1, 1}, "scene: wind", "", "has no meaning: no body has drag");
   }
   void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
     if (scene.wind) rate.take(scene.wind->norm() / length);
   }
-  void body_fields(const files::Form& form, Body& body) const override {
-    form.table("drag", body.drag, [](const files::Form& in, Drag& drag) {
-      in.number("linear", drag.linear, files::kNotNegative, kDamping);
-      in.number("quadratic", drag.quadratic, files::kNotNegative, {"N s^2/m^2", 1, -1, 0});
-      in.number("rotational", drag.rotational, files::kNotNegative, {"N m s", 1, 2, -1});
+  void body_fields(const Form& form, Body& body) const override {
+    form.table("drag", body.drag, [](const Form& in, Drag& drag) {
+      in.number("linear", drag.linear, kNotNegative, kDamping);
+      in.number("quadratic", drag.quadratic, kNotNegative, {"N s^2/m^2", 1, -1, 0});
+      in.number("rotational", drag.rotational, kNotNegative, {"N m s", 1, 2, -1});
     });
   }
-  void check_body(const Body& body, files::Report& report) const override {
+  void check_body(const Body& body, Report& report) const override {
     if (body.fixed && body.drag)
       report.add(body.place, fmt::format("body \"{}\": drag", body.name), "",
                  "has no meaning: the body is fixed");
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    int count = 0;
-    for (const Body& body : scene.bodies) count += body.drag.has_value();
-    if (count > 0)
-      lines.push_back({"drag", fmt::format("{} {}{}", count, count == 1 ? "body" : "bodies",
-                                           scene.wind ? ", in a wind" : "")});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "drag", count_if(scene.bodies, has_drag), "body",
+              scene.wind ? ", in a wind" : "");
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Dragged& each : dragged(momenta.scene)) {
@@ -142,11 +137,7 @@ class DragEffect : public Effect {
       momenta.axes.none(what);
     }
   }
-  bool does_work(const Scene& scene) const override {
-    for (const Body& body : scene.bodies)
-      if (body.drag) return true;
-    return false;
-  }
+  bool does_work(const Scene& scene) const override { return any_of(scene.bodies, has_drag); }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies&) const override {
     std::vector<Dragged> bodies = dragged(scene);
     return bodies.empty() ? nullptr

@@ -5,52 +5,41 @@
 // With static_friction a contact without slip holds where static_friction * normal impulse can hold
 // it. One that slips has the smaller coefficient until its slip ends, and impacts have it, too.
 // Both laws take energy only.
-
 #include "mechanics/effect.hpp"
 #include "numbers.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
-namespace {
-
-class FrictionEffect : public Effect {
- public:
-  void pair_fields(const files::Form& form, Pair& pair) const override {
+struct FrictionEffect : Effect {
+  void pair_fields(const Form& form, Pair& pair) const override {
     if (form.in() || pair.touch) coefficient(form, "friction", pair.friction, {});
     constexpr const char* kKey = "static_friction";
-    files::Fields* const in = form.in();
-    if (in && !in->has(kKey)) return;
-    if (in) pair.static_friction = 0;
-    if (!pair.static_friction) return;
-    coefficient(form, kKey, *pair.static_friction, {});
-    if (!in) return;
+    coefficient(form, kKey, pair.static_friction);
+    Fields* const in = form.in();
+    if (!in || !pair.static_friction) return;
     if (!pair.touch) in->wrong(kKey, "is of a contact, and touch = false has none");
     if (*pair.static_friction < pair.friction)
       in->wrong(kKey, fmt::format("must be at least friction, {}", pair.friction));
     if (in->has("friction_across"))
       in->wrong(kKey, "is of friction that is the same in all directions: without friction_across");
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;
     if (law == contact::Law::frictionless ||
         !any_of(scene.pairs, [](const Pair& pair) { return pair.friction > 0; }))
       return;
     lines.push_back(
         {"friction", fmt::format("{}, law {}", range(scene.pairs, &Pair::friction), word(law))});
-    if (const auto count = count_if(
-            scene.pairs, [](const Pair& each) { return each.static_friction.has_value(); });
-        count > 0)
-      lines.push_back({"static friction", counted(count, "pair") + " of materials"});
+    add_count(
+        lines, "static friction",
+        count_if(scene.pairs, [](const Pair& each) { return each.static_friction.has_value(); }),
+        "pair", " of materials");
   }
   void configure_pair(const Pair& pair, contact::Meeting& meeting) const override {
     meeting.friction = pair.friction;
     meeting.static_friction = pair.static_friction;
   }
 };
-
-}  // namespace
 
 TETHER_EFFECT(friction, FrictionEffect)
 

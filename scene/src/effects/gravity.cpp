@@ -1,17 +1,13 @@
 // Tether: uniform gravity. SPDX-License-Identifier: BSD-3-Clause
 //
 //   force m g at the centre of mass,   potential -m g . x
-
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
-class GravityForce : public Force {
- public:
+struct GravityForce : Force {
   GravityForce(const Vector3d& g, const Bodies& bodies) : g_(g) {
     for (int b = 0; b < bodies.world(); ++b)
       if (bodies.moves(b)) bodies_.push_back(b);
@@ -42,12 +38,11 @@ class GravityForce : public Force {
   std::vector<int> bodies_;  // those that move
 };
 
-class Gravity : public Effect {
- public:
-  void scene_fields(const files::Form& form, Scene& scene) const override {
+struct Gravity : Effect {
+  void scene_fields(const Form& form, Scene& scene) const override {
     form.vector("gravity", scene.gravity, kAcceleration);
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     if (!scene.gravity) return;
     const Vector3d& g = *scene.gravity;
     lines.push_back({"gravity", fmt::format("[{}, {}, {}] m/s^2", g.x(), g.y(), g.z())});

@@ -15,8 +15,6 @@
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
 /// A centre, which the world carries, and a body.
@@ -62,8 +60,7 @@ struct GradientItem {
   }
 };
 
-class GradientForces : public PairForces<GradientItem> {
- public:
+struct GradientForces : PairForces<GradientItem> {
   GradientForces(const Scene& scene, const Bodies& bodies) {
     for (const CentralGravity& centre : scene.central_gravity)
       for (int b = 0; centre.gradient && b < bodies.world(); ++b) {
@@ -76,17 +73,16 @@ class GradientForces : public PairForces<GradientItem> {
   const char* name() const override { return "gravity gradient"; }
 };
 
-class GravityGradientEffect : public Effect {
- public:
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count =
-        count_if(scene.central_gravity, [](const CentralGravity& each) { return each.gradient; });
-    if (count > 0) lines.push_back({"gravity gradient", counted(count, "centre")});
+bool has_gradient(const CentralGravity& centre) { return centre.gradient; }
+
+struct GravityGradientEffect : Effect {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "gravity gradient", count_if(scene.central_gravity, has_gradient), "centre");
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    const bool any =
-        any_of(scene.central_gravity, [](const CentralGravity& each) { return each.gradient; });
-    return any ? std::make_unique<GradientForces>(scene, bodies) : nullptr;
+    return any_of(scene.central_gravity, has_gradient)
+               ? std::make_unique<GradientForces>(scene, bodies)
+               : nullptr;
   }
 };
 

@@ -1,12 +1,9 @@
 // Tether: the gyroscopic term of the equations of motion. SPDX-License-Identifier: BSD-3-Clause
 //
 //   torque -w x I w in body axes; none where the inertia is a sphere's
-
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
-
-using namespace mechanics;
 
 namespace {
 
@@ -24,8 +21,7 @@ std::vector<int> precessing(const Scene& scene) {
   return bodies;
 }
 
-class GyroscopicTorque : public Force {
- public:
+struct GyroscopicTorque : Force {
   explicit GyroscopicTorque(std::vector<int> bodies) : bodies_(std::move(bodies)) {}
   const char* name() const override { return "gyroscopic term"; }
   Stepping stepping() const override { return Stepping::by_contact; }
@@ -50,10 +46,8 @@ class GyroscopicTorque : public Force {
   std::vector<int> bodies_;
 };
 
-class GyroscopicEffect : public Effect {
- public:
-  void plan(const Scene& scene, EngineKind engine,
-            std::vector<PlannedEffect>& lines) const override {
+struct GyroscopicEffect : Effect {
+  void plan(const Scene& scene, EngineKind engine, Lines& lines) const override {
     const bool steps = engine == EngineKind::stepping;
     const Gyroscopic how = scene.stepping.value_or(SteppingOptions{}).gyroscopic;
     if (precessing(scene).empty() || (steps && how == Gyroscopic::none)) return;

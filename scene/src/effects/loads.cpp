@@ -13,8 +13,6 @@
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
 using Knot = LoadHistory::Knot;
@@ -55,8 +53,7 @@ double factor_of(const Load& load, const Bodies& bodies) {
   return span > 0 ? mean(h.table, t, t + span) : value(h.table, t, t == bodies.since);
 }
 
-class LoadForce : public Force {
- public:
+struct LoadForce : Force {
   explicit LoadForce(std::vector<Load> loads) : loads_(std::move(loads)) {}
   const char* name() const override { return "loads"; }
 
@@ -117,7 +114,7 @@ class LoadForce : public Force {
   std::vector<Load> loads_;  // on bodies that move
 };
 
-void read_table(files::Fields& in, std::optional<LoadHistory>& history) {
+void read_table(Fields& in, std::optional<LoadHistory>& history) {
   std::vector<Knot> table;
   for (const auto& [time, factor] : in.pairs("table", kMostListed)) table.push_back({time, factor});
   const auto earlier = [](const Knot& a, const Knot& b) { return a.time < b.time; };
@@ -129,15 +126,15 @@ void read_table(files::Fields& in, std::optional<LoadHistory>& history) {
                                   kMostListed));
 }
 
-void history_fields(const files::Form& form, std::optional<LoadHistory>& history) {
-  if (files::Fields* in = form.in(); in && in->has("table")) {
+void history_fields(const Form& form, std::optional<LoadHistory>& history) {
+  if (Fields* in = form.in(); in && in->has("table")) {
     if (in->has("sine")) return in->wrong("table", "give sine or table, not both");
     return read_table(*in, history);
   }
   if (!history || history->table.empty())
-    return form.table("sine", history, [](const files::Form& sine, LoadHistory& h) {
-      sine.number("mean", h.mean, files::kAny, "part of the load");
-      sine.number("frequency", h.frequency, files::kNotNegative, kHertz);
+    return form.table("sine", history, [](const Form& sine, LoadHistory& h) {
+      sine.number("mean", h.mean, kAny, "part of the load");
+      sine.number("frequency", h.frequency, kNotNegative, kHertz);
       sine.angle("phase_", h.phase);
     });
   std::vector<std::array<double, 2>> rows;
@@ -148,10 +145,9 @@ void history_fields(const files::Form& form, std::optional<LoadHistory>& history
   if (form.out()) form.out()->field("table", rows);
 }
 
-class LoadEffect : public Effect {
- public:
-  void fields(const files::Form& root, Scene& scene) const override {
-    root.each("load", scene.loads, [](const files::Form& form, Load& load) {
+struct LoadEffect : Effect {
+  void fields(const Form& root, Scene& scene) const override {
+    root.each("load", scene.loads, [](const Form& form, Load& load) {
       form.body("body", load.body);
       form.vector("force", load.force, kForce);
       form.vector("torque", load.torque, kMoment);
@@ -162,7 +158,7 @@ class LoadEffect : public Effect {
       return true;
     });
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     for (const Load& load : scene.loads)
       if (scene.bodies[at(load.body)].fixed)
         report.add(load.place, "load: body",
@@ -172,17 +168,13 @@ class LoadEffect : public Effect {
         check_frequency(scene, load.history->frequency, load.place, "load: sine: frequency",
                         report);
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const std::size_t count = scene.loads.size();
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     const auto in_time =
         count_if(scene.loads, [](const Load& load) { return load.history.has_value(); });
     const auto in_body = count_if(scene.loads, [](const Load& load) { return load.in_body; });
-    if (count > 0)
-      lines.push_back(
-          {"loads",
-           counted(count, "load") +
-               (in_body > 0 ? fmt::format(", {} of them in axes of bodies", in_body) : "") +
-               (in_time > 0 ? fmt::format(", {} of them change with time", in_time) : "")});
+    add_count(lines, "loads", scene.loads.size(), "load",
+              (in_body > 0 ? fmt::format(", {} of them in axes of bodies", in_body) : "") +
+                  (in_time > 0 ? fmt::format(", {} of them change with time", in_time) : ""));
   }
   void take_rates(const Scene& scene, double length, double mass, Largest& rate) const override {
     for (const Load& load : scene.loads) {

@@ -20,6 +20,11 @@ inline void coefficient(const files::Form& form, const char* key, double& x, con
                                     kLargestMotion));
 }
 
+inline void coefficient(const files::Form& form, const char* key, std::optional<double>& x) {
+  if (form.in() && form.in()->has(key)) x = 0;
+  if (x) coefficient(form, key, *x, {});
+}
+
 /// "0.3", or "0.1 to 0.5" where the pairs that touch differ; there must be one.
 inline std::string range(const std::vector<Pair>& pairs, double Pair::*value) {
   double low = HUGE_VAL, high = -HUGE_VAL;

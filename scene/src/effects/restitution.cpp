@@ -2,22 +2,16 @@
 //
 // Newton's law: normal velocity after an impact = -restitution * the one before; Poisson's: the
 // same of impulses.
-
 #include "mechanics/effect.hpp"
 #include "numbers.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
-namespace {
-
-class RestitutionEffect : public Effect {
- public:
-  void pair_fields(const files::Form& form, Pair& pair) const override {
-    if (form.in() || pair.touch) form.number("restitution", pair.restitution, files::kPart);
+struct RestitutionEffect : Effect {
+  void pair_fields(const Form& form, Pair& pair) const override {
+    if (form.in() || pair.touch) form.number("restitution", pair.restitution, kPart);
   }
-  void plan(const Scene& scene, EngineKind kind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind kind, Lines& lines) const override {
     const bool limits =
         any_of(scene.joints, [](const Joint& joint) { return joint.limits.has_value(); });
     if (kind != EngineKind::smooth && (limits || !scene.pairs.empty()))
@@ -29,8 +23,6 @@ class RestitutionEffect : public Effect {
     meeting.restitution = pair.restitution;
   }
 };
-
-}  // namespace
 
 TETHER_EFFECT(restitution, RestitutionEffect)
 

@@ -2,23 +2,17 @@
 //
 // |moment across the normal| <= rolling * normal impulse, |moment about it| <= torsional * normal
 // impulse.
-
 #include "mechanics/effect.hpp"
 #include "numbers.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
-namespace {
-
-class RollingFrictionEffect : public Effect {
- public:
-  void pair_fields(const files::Form& form, Pair& pair) const override {
+struct RollingFrictionEffect : Effect {
+  void pair_fields(const Form& form, Pair& pair) const override {
     coefficient(form, "rolling", pair.rolling, kMetres);
     coefficient(form, "torsional", pair.torsional, kMetres);
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     const auto any = [&](double Pair::*value) {
       return any_of(scene.pairs, [&](const Pair& pair) { return pair.*value > 0; });
     };
@@ -32,8 +26,6 @@ class RollingFrictionEffect : public Effect {
     meeting.torsional = pair.torsional;
   }
 };
-
-}  // namespace
 
 TETHER_EFFECT(rolling_friction, RollingFrictionEffect)
 

@@ -5,22 +5,14 @@
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
-namespace {
-
-class SleepEffect : public Effect {
- public:
-  void plan(const Scene& scene, EngineKind engine,
-            std::vector<PlannedEffect>& lines) const override {
+struct SleepEffect : Effect {
+  void plan(const Scene& scene, EngineKind engine, Lines& lines) const override {
     const double sleep = scene.stepping.value_or(SteppingOptions{}).sleep;
     if (engine != EngineKind::stepping || !(sleep > 0)) return;
     lines.push_back(
         {"sleep", fmt::format("islands slower than {} sqrt(g s) for 5 sqrt(s / g)", sleep)});
   }
 };
-
-}  // namespace
 
 TETHER_EFFECT(sleep, SleepEffect)
 

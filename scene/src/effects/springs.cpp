@@ -4,14 +4,9 @@
 //
 //   tension k (|d| - rest) + c d|d|/dt along d,   potential k (|d| - rest)^2 / 2,
 //   power of the damper -c (d|d|/dt)^2
-
-#include "mechanics/effect.hpp"
-#include "mechanics/pair_forces.hpp"
-#include "tension.hpp"
+#include "cable.hpp"
 
 namespace tether::scene::effects {
-
-using namespace mechanics;
 
 namespace {
 
@@ -71,8 +66,7 @@ S Item::power(double, const Frame<S>& A, const Frame<S>& B) const {
   return S(-damping * along * along / dot(span.d, span.d));
 }
 
-class SpringForces : public PairForces<Item> {
- public:
+struct SpringForces : PairForces<Item> {
   SpringForces(const std::vector<Spring>& springs, const Bodies& bodies) {
     for (std::size_t i = 0; i < springs.size(); ++i) {
       const Spring& each = springs[i];
@@ -129,39 +123,37 @@ class SpringForces : public PairForces<Item> {
 bool damps(const Spring& spring) { return spring.damping > 0; }
 bool pulls(const Spring& spring) { return spring.stiffness > 0 || !damps(spring); }
 
-class SpringEffect : public Effect {
- public:
-  void fields(const files::Form& root, Scene& scene) const override {
-    const auto is_spring = [](const Spring& each) { return !each.cable; };
+struct SpringEffect : Effect {
+  void fields(const Form& root, Scene& scene) const override {
     root.each(
         "spring", scene.springs,
-        [](const files::Form& form, Spring& spring) {
+        [](const Form& form, Spring& spring) {
           form.name("spring", spring.name);
           form.bodies(spring.first, spring.second);
           form.points(spring.at, spring.at_second);
-          form.number("stiffness", spring.stiffness, files::kNotNegative, kStiffness);
-          form.number("damping", spring.damping, files::kNotNegative, kDamping);
-          form.number("rest", spring.rest, files::kNotNegative, kMetres);
+          form.number("stiffness", spring.stiffness, kNotNegative, kStiffness);
+          form.number("damping", spring.damping, kNotNegative, kDamping);
+          form.number("rest", spring.rest, kNotNegative, kMetres);
           form.require_one("stiffness", "damping", "give stiffness (N/m), damping (N s/m) or both");
           return true;
         },
-        is_spring);
+        [](const Spring& each) { return !is_cable(each); });
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     std::vector<Spring> springs;
     for (const Spring& each : scene.springs)
       if (!each.cable) springs.push_back(each);
-    files::check_connections(scene, springs, "spring", report);
+    check_connections(scene, springs, "spring", report);
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     int springs = 0, dampers = 0;
     for (const Spring& each : scene.springs) {
       if (each.cable) continue;
       springs += pulls(each);
       dampers += damps(each);
     }
-    if (springs > 0) lines.push_back({"springs", counted(springs, "spring")});
-    if (dampers > 0) lines.push_back({"dampers", counted(dampers, "damper")});
+    add_count(lines, "springs", springs, "spring");
+    add_count(lines, "dampers", dampers, "damper");
   }
   void add_columns(const Scene& scene, std::vector<Column>& columns) const override {
     if (!scene.output.forces) return;
@@ -190,15 +182,10 @@ class SpringEffect : public Effect {
                             what + " holds from outside");
     }
   }
-  bool does_work(const Scene& scene) const override {
-    for (const Spring& each : scene.springs)
-      if (damps(each)) return true;
-    return false;
-  }
+  bool does_work(const Scene& scene) const override { return any_of(scene.springs, damps); }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    if (all_of(scene.springs, [](const Spring& each) { return each.cable.has_value(); }))
-      return nullptr;
-    return std::make_unique<SpringForces>(scene.springs, bodies);
+    return all_of(scene.springs, is_cable) ? nullptr
+                                           : std::make_unique<SpringForces>(scene.springs, bodies);
   }
 };
 

@@ -7,31 +7,24 @@
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
-namespace {
-
-class SurfaceSpeedEffect : public Effect {
- public:
-  void body_fields(const files::Form& form, Body& body) const override {
-    form.table("surface", body.surface, [](const files::Form& in, SurfaceSpeed& speed) {
+struct SurfaceSpeedEffect : Effect {
+  void body_fields(const Form& form, Body& body) const override {
+    form.table("surface", body.surface, [](const Form& in, SurfaceSpeed& speed) {
       in.vector("velocity", speed.velocity, kSpeed);
       in.vector("angular_velocity", speed.angular_velocity, kTurning);
       in.require_one("velocity", "angular_velocity",
                      "give velocity (m/s), angular_velocity (rad/s) or both");
     });
   }
-  void check_body(const Body& body, files::Report& report) const override {
+  void check_body(const Body& body, Report& report) const override {
     if (body.surface && body.material.empty())
       report.add(body.place, fmt::format("body \"{}\": surface", body.name), "",
                  "has no meaning: the body touches nothing, it has no material");
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    int count = 0;
-    for (const Body& body : scene.bodies) count += body.surface.has_value();
-    if (count > 0)
-      lines.push_back(
-          {"surface speed", fmt::format("{} {}", count, count == 1 ? "body" : "bodies")});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "surface speed",
+              count_if(scene.bodies, [](const Body& body) { return body.surface.has_value(); }),
+              "body");
   }
   void take_rates(const Scene& scene, double length, double, Largest& rate) const override {
     for (const Body& body : scene.bodies) {
@@ -41,8 +34,6 @@ class SurfaceSpeedEffect : public Effect {
     }
   }
 };
-
-}  // namespace
 
 TETHER_EFFECT(surface_speed, SurfaceSpeedEffect)
 

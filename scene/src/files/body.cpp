@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "effects/list.hpp"
-#include "geometry/read_surface.hpp"
 #include "geometry/shape_type.hpp"
 #include "read.hpp"
 
@@ -117,6 +116,39 @@ ReadShapes read_shapes(Fields& in, Reader& r, bool fixed) {
   return out;
 }
 
+// [xx, yy, zz] or with [xy, xz, yz] behind them.
+void read_inertia(Fields& in, Body& body) {
+  const std::vector<double> moments = in.numbers("inertia", {3, 6}, "kg m^2");
+  if (moments.empty()) return;
+  Matrix3d& J = body.inertia = Vector3d(moments[0], moments[1], moments[2]).asDiagonal();
+  if (moments.size() == 6) {
+    J(0, 1) = J(1, 0) = moments[3];
+    J(0, 2) = J(2, 0) = moments[4];
+    J(1, 2) = J(2, 1) = moments[5];
+  }
+  if (!(body.fixed && J.isZero(0)) && !is_inertia(J))
+    in.wrong("inertia",
+             "principal moments must be > 0 and each at most the sum of the other two (triangle "
+             "inequality), kg m^2");
+}
+
+// The solid that the shapes are, of density 1: a fixed mesh is a surface without an inside.
+MassProperties solid_of(const Body& body) {
+  std::vector<Shape> solids = body.shapes;
+  const auto is_surface = [&](const Shape& s) { return body.fixed && s.kind == ShapeKind::mesh; };
+  solids.erase(std::remove_if(solids.begin(), solids.end(), is_surface), solids.end());
+  return mass_properties(solids);
+}
+
+double size_of(const Body& body) {
+  double size = 0;
+  for (const Shape& shape : body.shapes) {
+    size = std::max({size, shape.radius, shape.length, shape.size.maxCoeff()});
+    for (const Vector3d& p : shape.points) size = std::max(size, p.norm());
+  }
+  return size;
+}
+
 void read_mass(Fields& in, Body& body) {
   const bool by_mass = in.has("mass"), by_density = in.has("density"),
              by_inertia = in.has("inertia");
@@ -126,90 +158,49 @@ void read_mass(Fields& in, Body& body) {
   if (by_mass && by_density) in.wrong("density", "give mass or density, not both");
   if (!by_mass && !by_density && !body.fixed)
     in.missing("mass", "give mass (kg) or density (kg/m^3), or fixed = true");
+  read_inertia(in, body);
+  if (!by_density && (!by_mass || by_inertia || !(body.mass > 0))) return;
 
-  const std::vector<double> moments = in.numbers("inertia", {3, 6}, "kg m^2");
-  if (by_inertia && !moments.empty()) {
-    Matrix3d inertia = Vector3d(moments[0], moments[1], moments[2]).asDiagonal();
-    if (moments.size() == 6) {
-      inertia(0, 1) = inertia(1, 0) = moments[3];
-      inertia(0, 2) = inertia(2, 0) = moments[4];
-      inertia(1, 2) = inertia(2, 1) = moments[5];
-    }
-    const bool none = body.fixed && inertia.isZero(0);
-    if (!none && !is_inertia(inertia))
-      in.wrong("inertia",
-               "principal moments must be > 0 and each at most the sum of the other two (triangle "
-               "inequality), kg m^2");
-    body.inertia = inertia;
-  }
-  const bool from_shapes = by_density || (by_mass && !by_inertia && body.mass > 0);
-  if (!from_shapes) return;
-
-  const char* const advice = by_density ? "density" : "inertia";
-  // A fixed mesh is a surface without an inside.
-  std::vector<Shape> solids = body.shapes;
-  if (body.fixed) {
-    const auto is_mesh = [](const Shape& s) { return s.kind == ShapeKind::mesh; };
-    solids.erase(std::remove_if(solids.begin(), solids.end(), is_mesh), solids.end());
-  }
-  const MassProperties solid = mass_properties(solids);
+  const MassProperties solid = solid_of(body);
   if (!(solid.volume > 0) || !std::isfinite(solid.volume)) {
     const std::string why = body.shapes.empty() ? "there is no shape to take it from"
                                                 : "the shapes have no (finite) volume";
-    if (by_density)
-      in.wrong(advice, why + "; give mass and inertia");
-    else
-      in.missing(advice, "[xx, yy, zz] about the centre, body axes, kg m^2: " + why);
-    return;
+    if (by_density) return in.wrong("density", why + "; give mass and inertia");
+    return in.missing("inertia", "[xx, yy, zz] about the centre, body axes, kg m^2: " + why);
   }
   if (by_density) body.mass = density * solid.volume;
   if (by_inertia) return;
   body.inertia = body.mass / solid.volume * solid.inertia;
-  double size = 0;
-  for (const Shape& shape : body.shapes) {
-    size = std::max({size, shape.radius, shape.length, shape.size.maxCoeff()});
-    for (const Vector3d& p : shape.points) size = std::max(size, p.norm());
-  }
-  if (!(solid.centre.norm() <= 1e-6 * size)) {
-    const Vector3d& c = solid.centre;
-    in.missing("inertia",
-               fmt::format("the body's origin must be its centre of mass, but the shapes' centre "
-                           "is [{}, {}, {}]; move the shapes by its negative, or give mass and "
-                           "inertia",
-                           c.x(), c.y(), c.z()));
-    return;
-  }
+  if (!(solid.centre.norm() <= 1e-6 * size_of(body)))
+    return in.missing("inertia", fmt::format("the body's origin must be its centre of mass, but "
+                                             "the shapes' centre is {}; move the shapes by its "
+                                             "negative, or give mass and inertia",
+                                             toml(solid.centre)));
   if (!is_inertia(body.inertia))
     in.missing("inertia", "that of the shapes is not a finite number > 0");
 }
 
-using Keys = std::vector<std::pair<std::string, std::string>>;
-
-Keys shape_keys(const Shape& shape) {
-  Keys keys{{"shape", toml_word(shape.kind)}};
+void write_shape(const Shape& shape, Writer& out) {
+  out.raw("shape", toml_word(shape.kind));
   for (const ShapeField& field : type_of(shape.kind).fields())
-    std::visit([&](auto member) { keys.emplace_back(field.key, toml(shape.*member)); },
-               field.value);
-  return keys;
-}
-
-bool at_origin(const Shape& shape) {
-  return shape.position.isZero(0) &&
-         shape.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs();
+    std::visit([&](auto member) { out.field(field.key, shape.*member); }, field.value);
 }
 
 void write_shapes(const Body& body, Writer& out) {
-  if (body.shapes.size() == 1 && at_origin(body.shapes.front())) {
-    for (const auto& [key, value] : shape_keys(body.shapes.front())) out.raw(key, value);
-    return;
-  }
+  const auto at_origin = [](const Shape& shape) {
+    return shape.position.isZero(0) &&
+           shape.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs();
+  };
   if (body.shapes.empty()) return;
+  if (body.shapes.size() == 1 && at_origin(body.shapes.front()))
+    return write_shape(body.shapes.front(), out);
   std::string text = "[\n";
   for (const Shape& shape : body.shapes) {
-    text += "  { ";
-    for (const auto& [key, value] : shape_keys(shape)) text += fmt::format("{} = {}, ", key, value);
-    text += fmt::format("position = {}, orientation = {} }},\n", toml(shape.position),
-                        toml(shape.orientation));
+    Writer inside(Writer::Layout::inside);
+    write_shape(shape, inside);
+    inside.field("position", shape.position);
+    inside.field("orientation", shape.orientation);
+    text += "  { " + inside.take() + " },\n";
   }
   out.raw("shapes", text + "]");
 }
@@ -218,7 +209,7 @@ void write_mass(const Body& body, Writer& out) {
   const Matrix3d& J = body.inertia;
   out.field("mass", body.mass, "kg");
   if (!body.fixed || !J.isZero(0) || body.mass > 0)
-    out.field("inertia", std::vector<double>{J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2)},
+    out.field("inertia", std::array{J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2)},
               "xx, yy, zz, xy, xz, yz; kg m^2, body axes");
 }
 

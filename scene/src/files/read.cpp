@@ -12,33 +12,29 @@ namespace tether::scene::files {
 
 namespace {
 
-std::string called(const Body& body) { return fmt::format("body \"{}\"", body.name); }
-
 void check_bodies(const Scene& scene, Report& report) {
   if (scene.bodies.empty())
     report.add({scene.file, 1, 1}, "[[body]]", "", "is missing; a scene has at least one body");
   std::set<std::string> names;
   for (const Body& body : scene.bodies) {
+    const auto wrong = [&](const char* field, const char* why) {
+      report.add(body.place, fmt::format("body \"{}\": {}", body.name, field), "", why);
+    };
+    const auto has = [&](ShapeKind kind) {
+      return any_of(body.shapes, [&](const Shape& s) { return s.kind == kind; });
+    };
     if (body.name.empty() || body.name == "world")
-      report.add(body.place, called(body) + ": name", "",
-                 "must be neither empty nor \"world\", which is the ground");
-    if (!names.insert(body.name).second)
-      report.add(body.place, called(body) + ": name", "", "another body has it already");
-    const bool plane =
-        any_of(body.shapes, [](const Shape& s) { return s.kind == ShapeKind::plane; });
-    if (plane && !body.fixed)
-      report.add(body.place, called(body) + ": fixed", "",
-                 "must be true: a plane is infinite and cannot move");
-    const bool mesh = any_of(body.shapes, [](const Shape& s) { return s.kind == ShapeKind::mesh; });
-    if (mesh && !body.fixed)
-      report.add(body.place, called(body) + ": fixed", "",
-                 "must be true: on a body that moves a mesh is given as its convex_parts()");
+      wrong("name", "must be neither empty nor \"world\", which is the ground");
+    check_name(body, "body", names, report);
+    if (has(ShapeKind::plane) && !body.fixed)
+      wrong("fixed", "must be true: a plane is infinite and cannot move");
+    if (has(ShapeKind::mesh) && !body.fixed)
+      wrong("fixed", "must be true: on a body that moves a mesh is given as its convex_parts()");
     if (body.fixed && (!body.velocity.isZero(0) || !body.angular_velocity.isZero(0)))
-      report.add(body.place, called(body) + ": velocity", "", "must be zero: the body is fixed");
+      wrong("velocity", "must be zero: the body is fixed");
     for (const effects::Effect* each : effects::all()) each->check_body(body, report);
     if (!body.material.empty() && body.shapes.empty())
-      report.add(body.place, called(body) + ": material", "",
-                 "needs a shape: without one the body touches nothing");
+      wrong("material", "needs a shape: without one the body touches nothing");
   }
 }
 
@@ -56,16 +52,6 @@ void check_times(const Scene& scene, Report& report) {
                  fmt::format("must be from 0 to the end, {} s", scene.end));
 }
 
-/// The table, where it is there; `check(in, options)` says what no single field shows.
-template <class Options, class Check>
-void read_options(Fields& root, Reader& r, const char* key, std::optional<Options>& to,
-                  const Check& check) {
-  Form(root, r).table(key, to, [&](const Form& form, Options& options) {
-    each_field(options, form);
-    check(*form.in(), options);
-  });
-}
-
 void check_stepping(Fields& in, const Scene& scene, const SteppingOptions& o) {
   if (scene.simultaneous_impacts == contact::SimultaneousImpacts::in_turn &&
       (o.accuracy > 0 || !o.cut_at_impacts))
@@ -80,45 +66,27 @@ void check_stepping(Fields& in, const Scene& scene, const SteppingOptions& o) {
     in.wrong("sleep", "does not go with rolling and torsional friction of pairs");
 }
 
-void read_engine(Fields& root, Reader& r) {
-  const auto nothing = [](Fields&, const auto&) {};
-  Scene& scene = r.scene;
-  read_options(root, r, "smooth", scene.smooth, nothing);
-  read_options(root, r, "stepping", scene.stepping,
-               [&](Fields& in, const SteppingOptions& o) { check_stepping(in, scene, o); });
+void read_engine(const Form& root, Scene& scene) {
+  root.table("smooth", scene.smooth, [](const Form& in, auto& o) { each_field(o, in); });
+  root.table("stepping", scene.stepping, [&](const Form& in, SteppingOptions& o) {
+    each_field(o, in);
+    check_stepping(*in.in(), scene, o);
+  });
   if (scene.smooth && scene.stepping)
-    root.wrong("stepping", "a scene has [smooth] or [stepping], not both");
-  read_options(root, r, "event", scene.event, nothing);
+    root.in()->wrong("stepping", "a scene has [smooth] or [stepping], not both");
+  root.table("event", scene.event, [](const Form& in, auto& o) { each_field(o, in); });
   if (scene.event && (scene.smooth || (scene.stepping && !goes_on_in_steps(scene))))
-    root.wrong("event",
-               "a scene has one of [smooth], [stepping] and [event]; [stepping] beside [event] is "
-               "for otherwise = \"stepping\"");
-}
-
-using Names = std::map<std::string, int>;
-
-/// By name; the first of several.
-template <class Named>
-Names index_of(const std::vector<Named>& all) {
-  Names out;
-  int index = 0;
-  for (const Named& each : all) out.emplace(each.name, index++);
-  return out;
+    root.in()->wrong("event",
+                     "a scene has one of [smooth], [stepping] and [event]; [stepping] beside "
+                     "[event] is for otherwise = \"stepping\"");
 }
 
 /// The element of [[kind]] that the field `kind` names.
 template <class Named>
-void named(const Form& form, const char* kind, const Names& names, const std::vector<Named>& all,
-           int& index) {
-  if (form.out()) return form.out()->field(kind, all[linalg::at(index)].name);
-  Fields& in = *form.in();
-  if (!in.has(kind)) return in.missing(kind, fmt::format("the name of a {}", kind));
-  const std::string name = in.name(kind, "");
-  const auto found = names.find(name);
-  if (found != names.end())
-    index = found->second;
-  else
-    in.wrong(kind, fmt::format("no such {}{}", kind, form.reader()->hint_of(name, names)));
+void named(const Form& form, const char* kind, const std::map<std::string, int>& names,
+           const std::vector<Named>& all, int& index) {
+  if (form.out()) form.out()->field(kind, all[linalg::at(index)].name);
+  if (form.in()) index = form.reader()->named(*form.in(), kind, kind, names);
 }
 
 void expected_value(const Form& form, Expect& e) {
@@ -172,7 +140,7 @@ void list_fields(const Form& root, Scene& scene) {
 }
 
 void expect_fields(const Form& root, Scene& scene) {
-  const Names joints = index_of(scene.joints), springs = index_of(scene.springs);
+  const auto joints = index_of(scene.joints), springs = index_of(scene.springs);
   root.each("expect", scene.expect, [&](const Form& form, Expect& e) {
     if (form.in()) e.time = scene.end;
     form.number("time", e.time, kNotNegative, "s");
@@ -224,7 +192,7 @@ Scene read(Value document, const std::string& name) {
     r.scene.bodies.push_back(std::move(body));
   });
   list_fields(all, r.scene);
-  read_engine(root, r);
+  read_engine(all, r.scene);
   Fields output = r.fields(root.table("output"), "output");
   output_fields(Form(output, r), r.scene.output);
   output.finish();

@@ -32,7 +32,7 @@ void repeat_elements(Value& document, const std::string& file);
 constexpr int kMostCounted = 2000000000;
 
 inline void each_field(SmoothOptions& o, const Form& io) {
-  io.number("tolerance", o.tolerance, {1e-14, 1e-1, false, "a number from 1e-14 to 0.1"},
+  io.number("tolerance", o.tolerance, {1e-14, 1e-1, "a number from 1e-14 to 0.1"},
             "relative, and absolute in SI");
   io.word("formulation", o.formulation);
   io.flag("projection", o.projection);
@@ -41,7 +41,7 @@ inline void each_field(SmoothOptions& o, const Form& io) {
 }
 
 inline void each_field(EventOptions& o, const Form& io) {
-  io.number("tolerance", o.tolerance, {1e-13, 1e-1, false, "a number from 1e-13 to 0.1"},
+  io.number("tolerance", o.tolerance, {1e-13, 1e-1, "a number from 1e-13 to 0.1"},
             "relative, and absolute in SI");
   io.number("max_step", o.max_step, kNotNegative, "s; 0: free");
   io.count("max_events", o.max_events, 1, kMostCounted);
@@ -52,7 +52,7 @@ inline void each_field(EventOptions& o, const Form& io) {
 inline void each_field(SteppingOptions& o, const Form& io) {
   constexpr const char* kOfSpeed = "of sqrt(gravity * size)";
   io.number("step", o.step, kPositive, "s");
-  io.number("accuracy", o.accuracy, {0, 0.1, false, "a number from 0 to 0.1"},
+  io.number("accuracy", o.accuracy, {0, 0.1, "a number from 0 to 0.1"},
             "of the size of each body; 0: none, steps are taken whole");
   io.word("law", o.law);
   io.number("tolerance", o.tolerance, kPositivePart, "relative residual");
@@ -64,8 +64,7 @@ inline void each_field(SteppingOptions& o, const Form& io) {
   io.number("impact_threshold", o.impact_threshold, kNotNegative, kOfSpeed);
   io.flag("cut_at_impacts", o.cut_at_impacts);
   io.number("sleep", o.sleep, kNotNegative, "of sqrt(gravity * size); 0: none sleeps");
-  io.number("acceptance", o.acceptance, {1, 1e12, false, "a number from 1 to 1e12"},
-            "of the tolerance");
+  io.number("acceptance", o.acceptance, {1, 1e12, "a number from 1 to 1e12"}, "of the tolerance");
   io.count("max_halvings", o.max_halvings, 0, 30);
   io.count("max_sweeps", o.max_sweeps, 1, 1000000000);
   io.word("on_failure", o.on_failure);

@@ -20,13 +20,6 @@ std::size_t size_of(const Value& value) {
   return size;
 }
 
-bool is_vector(const Value& value) {
-  if (value.kind() != Value::Kind::array || value.items().size() != 3) return false;
-  for (const Value& item : value.items())
-    if (item.kind() != Value::Kind::number || !std::isfinite(item.number())) return false;
-  return true;
-}
-
 /// One direction of a repetition.
 struct Row {
   long count = 0;
@@ -105,7 +98,7 @@ class Repetition {
                             kMostListed));
         row.count = static_cast<long>(v.number());
       } else if (each.key == "step") {
-        if (!is_vector(v)) wrong(fmt::format("step = {}: must be [x, y, z], m", shown(v)));
+        if (!is_numbers(v, 3)) wrong(fmt::format("step = {}: must be [x, y, z], m", shown(v)));
         for (std::size_t i = 0; i < 3; ++i) row.step[i] = v.items()[i].number();
       } else {
         wrong(fmt::format("has no {}; it has count and step", each.key));
@@ -119,9 +112,9 @@ class Repetition {
   void shift(Value& value, const std::array<long, 3>& at) const {
     auto* items = std::get_if<Value::Items>(&value.held);
     if (items == nullptr) return;
-    if (!is_vector(value)) {
+    if (!is_numbers(value, 3)) {
       for (Value& each : *items)
-        if (is_vector(each)) shift(each, at);
+        if (is_numbers(each, 3)) shift(each, at);
       return;
     }
     for (std::size_t i = 0; i < 3; ++i)

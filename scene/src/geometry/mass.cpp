@@ -12,11 +12,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// |d|^2 1 - d d^T: the inertia of a unit point mass at d (parallel axes).
-Matrix3d point_inertia(const Vector3d& d) {
-  return d.squaredNorm() * Matrix3d::Identity() - d * d.transpose();
-}
-
 // Sums over tetrahedra with one corner at the origin: volume, first and second moments.
 struct Moments {
   double volume = 0;
@@ -34,6 +29,17 @@ struct Moments {
 };
 
 }  // namespace
+
+Matrix3d point_inertia(const Vector3d& d) {
+  return d.squaredNorm() * Matrix3d::Identity() - d * d.transpose();
+}
+
+// Turning by the identity would only add rounding.
+Matrix3d rotated(const Matrix3d& R, const Matrix3d& inertia) {
+  if (R == Matrix3d::Identity()) return inertia;
+  const Matrix3d out = R * inertia * R.transpose();
+  return (out + out.transpose()) / 2;
+}
 
 MassProperties within(const std::vector<Vector3d>& points,
                       const std::vector<std::vector<std::size_t>>& faces) {
@@ -72,14 +78,9 @@ MassProperties along_axes(double volume, const Vector3d& lengths, double part) {
 MassProperties mass_properties(const Shape& shape) {
   MassProperties out = type_of(shape.kind).solid(shape);
   if (!(out.volume > 0)) return {};
-  // Turning by the identity would only add rounding.
-  if (shape.orientation.coeffs() != Eigen::Quaterniond::Identity().coeffs()) {
-    const Matrix3d R = shape.orientation.toRotationMatrix();
-    const Matrix3d turned = R * out.inertia * R.transpose();
-    out.inertia = (turned + turned.transpose()) / 2;
-    out.centre = R * out.centre;
-  }
-  out.centre += shape.position;
+  const Matrix3d R = shape.orientation.toRotationMatrix();
+  out.inertia = rotated(R, out.inertia);
+  out.centre = R * out.centre + shape.position;
   return out;
 }
 

@@ -1,11 +1,6 @@
 // Tether: meshes and height fields of a scene file, and the files of surfaces that it names.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "read_surface.hpp"
-
 #include <fmt/format.h>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "bounds.hpp"
 #include "geometry/shape_type.hpp"
@@ -39,23 +34,20 @@ bool from_file(Fields& in, Reader& r, const Parse& parse) {
   return true;
 }
 
-bool is_number(const Value& v) { return v.kind() == Value::Kind::number && kAny.holds(v.number()); }
-
 std::vector<std::array<int, 3>> read_triangles(Fields& in, std::size_t points) {
-  const Value* value = in.find("triangles");
-  bool right = value->kind() == Value::Kind::array && !value->items().empty() &&
-               value->items().size() <= kMostTriangles;
+  bool right = true;
   std::vector<std::array<int, 3>> out;
-  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
-    const std::vector<Value>& corners = value->items()[k].items();
-    right = corners.size() == 3;
-    for (const Value& c : corners)
-      right = right && is_number(c) && c.whole() && c.number() >= 0 &&
-              c.number() < static_cast<double>(points);
-    if (right)
-      out.push_back({static_cast<int>(corners[0].number()), static_cast<int>(corners[1].number()),
-                     static_cast<int>(corners[2].number())});
-  }
+  right = each_row(*in.find("triangles"), 1, kMostTriangles, 3,
+                   [&](const Value::Items& corners) {
+                     for (const Value& c : corners)
+                       right = right && c.whole() && c.number() >= 0 &&
+                               c.number() < static_cast<double>(points);
+                     const auto corner = [&](std::size_t k) {
+                       return right ? static_cast<int>(corners[k].number()) : 0;
+                     };
+                     out.push_back({corner(0), corner(1), corner(2)});
+                   }) &&
+          right;
   if (right) return out;
   in.wrong("triangles",
            fmt::format("must be an array of 1 to {} triangles [i, j, k], numbers of points from 0",
@@ -65,18 +57,14 @@ std::vector<std::array<int, 3>> read_triangles(Fields& in, std::size_t points) {
 
 // Rows of equal length, at least two of two.
 Heights read_rows(Fields& in) {
-  const Value* value = in.find("heights");
+  const Value& rows = *in.find("heights");
+  const std::size_t columns = rows.items().empty() ? 0 : rows.items()[0].items().size();
   Heights out;
-  bool right = value->kind() == Value::Kind::array && value->items().size() >= 2;
-  for (std::size_t k = 0; right && k < value->items().size(); ++k) {
-    const std::vector<Value>& row = value->items()[k].items();
-    if (k == 0) out.columns = static_cast<int>(row.size());
-    right = row.size() >= 2 && static_cast<int>(row.size()) == out.columns &&
-            out.values.size() + row.size() <= kMostListed && all_of(row, is_number);
-    if (right)
-      for (const Value& each : row) out.values.push_back(each.number());
-  }
-  if (right) return out;
+  out.columns = static_cast<int>(columns);
+  if (columns >= 2 && each_row(rows, 2, kMostListed / columns, columns, [&](const auto& row) {
+        for (const Value& each : row) out.values.push_back(each.number());
+      }))
+    return out;
   in.wrong("heights",
            fmt::format("must be an array of rows of numbers, all of one length, at least "
                        "2 x 2, at most {}, m",

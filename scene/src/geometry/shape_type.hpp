@@ -107,6 +107,11 @@ MassProperties mass_properties(const Shape& shape);
 /// Properties of shapes that do not overlap, in the axes of their body.
 MassProperties mass_properties(const std::vector<Shape>& shapes);
 
+/// An inertia in the axes of which R has the directions as columns.
+Eigen::Matrix3d rotated(const Eigen::Matrix3d& R, const Eigen::Matrix3d& inertia);
+/// The inertia of a unit point mass at d.
+Eigen::Matrix3d point_inertia(const Eigen::Vector3d& d);
+
 /// Whether the principal moments are > 0 and each at most the sum of the others, but for rounding;
 /// inside: by so much that rounding on the way to a scene does no harm.
 bool is_inertia(const Eigen::Matrix3d& inertia, bool inside = false);
@@ -162,5 +167,16 @@ MassProperties within(const std::vector<Eigen::Vector3d>& points,
                       const std::vector<std::vector<std::size_t>>& faces);
 /// Faces of the hull of points, or these one by one.
 Mesh points_mesh(const std::vector<Eigen::Vector3d>& points);
+
+namespace files {
+
+/// shape = "mesh": points and triangles, or a file.
+void read_mesh(Fields& in, Reader& r, Shape& shape);
+/// The convex parts of the mesh of a body that moves; none where it bounds no solid.
+std::vector<Shape> read_parts(Fields& in, Reader& r, const Shape& mesh);
+/// shape = "height_field", a mesh as well: heights, or a file, and their spacing.
+void read_height_field(Fields& in, Reader& r, Shape& shape);
+
+}  // namespace files
 
 }  // namespace tether::scene

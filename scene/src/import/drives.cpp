@@ -19,13 +19,10 @@ namespace tether::scene::import {
 
 namespace {
 
-using Eigen::Vector3d;
-
-/// A hinge or slider of the draft; `value`: of its coordinate at the start, as the file counts it.
+/// A hinge or slider of the draft, and what the file says of it.
 struct PlacedCoordinate {
   std::size_t joint;
-  double value;
-  const LinkJoint* law;
+  const PlacedJoint* law;
 };
 using Coordinates = std::map<std::string, PlacedCoordinate>;
 
@@ -42,18 +39,17 @@ void each_joint(const std::vector<Part>& parts, const F& f) {
       for (const PlacedJoint& placed : part.joints) f(part, placed);
 }
 
-bool has_coordinate(const Joint& joint) {
-  return joint.kind == JointKind::hinge || joint.kind == JointKind::slider;
-}
-
 Coordinates coordinates_of(const std::vector<Part>& parts, const Draft& draft) {
   std::map<std::string, std::size_t> joints;
-  for (std::size_t j = 0; j < draft.scene.joints.size(); ++j)
-    if (has_coordinate(draft.scene.joints[j])) joints.emplace(draft.scene.joints[j].name, j);
+  for (std::size_t j = 0; j < draft.scene.joints.size(); ++j) {
+    const Joint& joint = draft.scene.joints[j];
+    if (joint.kind == JointKind::hinge || joint.kind == JointKind::slider)
+      joints.emplace(joint.name, j);
+  }
   Coordinates out;
   each_joint(parts, [&](const Part&, const PlacedJoint& placed) {
-    if (const auto found = joints.find(placed.law.name); found != joints.end())
-      out.emplace(placed.law.name, PlacedCoordinate{found->second, placed.value, &placed.law});
+    if (const auto found = joints.find(placed.name); found != joints.end())
+      out.emplace(placed.name, PlacedCoordinate{found->second, &placed});
   });
   return out;
 }
@@ -74,12 +70,12 @@ std::optional<Coupling> coupling_of(const std::vector<Transmission>& terms,
 void add_couplings(const Model& model, const std::vector<Part>& parts,
                    const Coordinates& coordinates, Scene& scene, Remarks& remarks) {
   each_joint(parts, [&](const Part&, const PlacedJoint& placed) {
-    if (!placed.law.mimic) return;
-    const Mimic& mimic = *placed.law.mimic;
+    if (!placed.mimic) return;
+    const Mimic& mimic = *placed.mimic;
     std::optional<Coupling> coupling =
-        coupling_of({{placed.law.name, 1}, {mimic.of, mimic.multiplier}}, coordinates);
-    if (!coupling || mimic.of == placed.law.name)
-      return remarks.add("mimic of joints that are none of their own here", placed.law.name);
+        coupling_of({{placed.name, 1}, {mimic.of, mimic.multiplier}}, coordinates);
+    if (!coupling || mimic.of == placed.name)
+      return remarks.add("mimic of joints that are none of their own here", placed.name);
     coupling->name = fmt::format("mimic {}", scene.couplings.size() + 1);
     coupling->weights.clear();
     coupling->polynomial = {mimic.multiplier};
@@ -102,8 +98,8 @@ void add_couplings(const Model& model, const std::vector<Part>& parts,
 void add_constant(const Joint& joint, double force, Scene& scene) {
   const Vector3d along = force * joint.axis.normalized();
   const auto push = [&](int b, const Vector3d& pull, const Vector3d& torque) {
-    if (b < 0 || scene.bodies[static_cast<std::size_t>(b)].fixed) return;
-    const auto turn = scene.bodies[static_cast<std::size_t>(b)].orientation.conjugate();
+    if (b < 0 || scene.bodies[at(b)].fixed) return;
+    const auto turn = scene.bodies[at(b)].orientation.conjugate();
     Load load;
     load.body = b;
     load.in_body = true;
@@ -118,8 +114,8 @@ void add_constant(const Joint& joint, double force, Scene& scene) {
   }
   push(joint.first, along, none);
   if (joint.second < 0) return;
-  const Vector3d arm = scene.bodies[static_cast<std::size_t>(joint.first)].position -
-                       scene.bodies[static_cast<std::size_t>(joint.second)].position;
+  const Vector3d arm =
+      scene.bodies[at(joint.first)].position - scene.bodies[at(joint.second)].position;
   push(joint.second, -along, -arm.cross(along));
 }
 
@@ -132,8 +128,7 @@ class Driving {
   void add(const Drive& drive) {
     const Vector3d law = law_of(drive, options_);
     const bool idle =
-        !drive.to.empty() && std::all_of(drive.to.begin(), drive.to.end(),
-                                         [](const Transmission& to) { return to.ratio == 0; });
+        !drive.to.empty() && all_of(drive.to, [](const Transmission& to) { return to.ratio == 0; });
     if (law.isZero(0) || idle)
       return remarks_.add("actuators that exert nothing (--control)", drive.name);
     for (const Transmission& to : drive.to)
@@ -170,7 +165,7 @@ class Driving {
     motor.stiffness = -r * r * law[1];
     motor.damping = -r * r * law[2];
     if (motor.stiffness > 0)
-      motor.target = r * (law[0] - mean) / motor.stiffness - along.value;
+      motor.target = r * (law[0] - mean) / motor.stiffness - along.law->value;
     else
       motor.rate = r * (law[0] - mean) / motor.damping;
     if (!is_number(motor.stiffness) || !is_number(motor.damping) || !is_number(motor.target) ||
@@ -207,9 +202,9 @@ class Rotor {
     Joint& joint = scene.joints[of.joint];
     take(joint.spring, joint.spring ? joint.spring->rest : 0, rail_.spring);
     take(joint.motor, joint.motor ? joint.motor->target : 0, rail_.motor);
-    const LinkJoint& law = *of.law;
+    const PlacedJoint& law = *of.law;
     if (!with_limits || !has_wide_limits(law)) return;
-    const double lower = law.limits->first - of.value, upper = law.limits->second - of.value;
+    const double lower = law.limits->first - law.value, upper = law.limits->second - law.value;
     if (lower <= 0 && upper >= 0) rail_.limits = JointLimits{lower, upper, 0};
   }
   bool counts() const { return rail_.spring || rail_.motor || rail_.limits; }
@@ -229,12 +224,10 @@ class Rotor {
     coupling.name = rail_.name;
     coupling.joints = {static_cast<int>(scene.joints.size()), static_cast<int>(of_.joint)};
     coupling.polynomial = {1};
-    scene.bodies.push_back(std::move(body));
-    scene.joints.push_back(std::move(rail_));
     scene.couplings.push_back(std::move(coupling));
     const std::string comment = fmt::format("line {}, its coordinate on a rail", of_.law->line);
-    draft.body_comments.push_back(comment);
-    draft.joint_comments.push_back(comment);
+    draft.add(std::move(body), comment);
+    draft.add(std::move(rail_), comment);
   }
 
  private:
@@ -244,13 +237,13 @@ class Rotor {
 
 }  // namespace
 
-Eigen::Vector3d law_of(const Drive& drive, const ImportOptions& options) {
+Vector3d law_of(const Drive& drive, const ImportOptions& options) {
   double control = 0;
   for (const auto& [name, value] : options.controls)
     if (name == drive.name) control = value;
   if (drive.control)
     control = std::min(std::max(control, drive.control->first), drive.control->second);
-  return drive.has_activation ? drive.bias : Vector3d(control * drive.gain + drive.bias);
+  return drive.gain ? Vector3d(control * *drive.gain + drive.bias) : drive.bias;
 }
 
 void add_common_laws(const Model& model, const std::vector<Part>& parts,
@@ -260,10 +253,10 @@ void add_common_laws(const Model& model, const std::vector<Part>& parts,
   Driving driving(coordinates, options, draft, remarks);
   for (const Drive& drive : model.drives) driving.add(drive);
   each_joint(parts, [&](const Part& part, const PlacedJoint& placed) {
-    const double armature = placed.law.armature;
-    const auto found = coordinates.find(placed.law.name);
+    const double armature = placed.armature;
+    const auto found = coordinates.find(placed.name);
     if (found == coordinates.end()) {
-      if (armature > 0) remarks.add("armature of what is no hinge or slider here", placed.law.name);
+      if (armature > 0) remarks.add("armature of what is no hinge or slider here", placed.name);
       return;
     }
     Rotor rotor(found->second, options.joint_laws, draft.scene);
@@ -271,13 +264,13 @@ void add_common_laws(const Model& model, const std::vector<Part>& parts,
       remarks.add(fmt::format("small bodies that count turns of hinges, for limits, springs and "
                               "drives ({:g} of the inertia)",
                               kSmallBody),
-                  placed.law.name);
+                  placed.name);
     if (!rotor.counts() && !(armature > 0)) return;
-    const double mass = armature > 0 ? armature : kSmallBody * inertia_about_joints(part);
+    const double mass = armature > 0 ? armature : kSmallBody * part.inertia_about_joints();
     if (is_number(mass) && mass > 1 / kMost)
       rotor.add(mass, draft);
     else
-      remarks.add("rotors whose inertia is beyond 1e100 or below 1e-100", placed.law.name);
+      remarks.add("rotors whose inertia is beyond 1e100 or below 1e-100", placed.name);
   });
 }
 

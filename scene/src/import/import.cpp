@@ -6,12 +6,8 @@
 #include <exception>
 #include <tether/scene/run.hpp>
 
-#include "mesh.hpp"
+#include "bounds.hpp"
 #include "parts.hpp"
-#include "robot.hpp"
-#include "xml.hpp"
-#include <cmath>
-#include <tether/linalg/symmetric_eigen.hpp>
 
 namespace tether::scene::import {
 
@@ -29,8 +25,9 @@ std::string heading(const Model& model, const std::string& file, const Draft& dr
   const Scene& scene = draft.scene;
   std::vector<std::string> lines{
       fmt::format("{}: from {} ({}) by tether import. Moving bodies: {}, joints: {}.",
-                  model.name.empty() ? "A robot" : model.name, file, model.format,
-                  scene.moving().size(), scene.joints.size()),
+                  model.name.empty() ? "A robot" : model.name, file,
+                  model.format == Format::urdf ? "URDF" : "MJCF", scene.moving().size(),
+                  scene.joints.size()),
       "Positions are those of the centres of mass, at the start; units are SI."};
   if (!remarks.empty()) lines.insert(lines.end(), {"", "Left out or changed:"});
   for (const std::string& remark : remarks) lines.push_back("  " + remark);
@@ -58,7 +55,7 @@ std::string with_comments(const std::string& toml, const std::string& kind,
 Model read(const Node& root, Problems& problems) {
   if (is(root, "robot")) return read_urdf(root, problems);
   if (is(root, "mujoco")) return read_mjcf(root, problems);
-  problems.add(root.GetLineNum(), path(root), "",
+  problems.add(root, "",
                is(root, "sdf") ? "SDF is not read; its tools write URDF"
                                : "must be <robot> (URDF) or <mujoco> (MJCF)");
   problems.finish();
@@ -108,68 +105,16 @@ Imported import_robot(std::string_view text, const std::string& file,
   } catch (const std::invalid_argument&) {
     throw;
   } catch (const std::exception& e) {  // out of memory
-    std::vector<Problem> one(1);
-    one.front().place.file = file;
-    one.front().allowed = std::string("cannot be read: ") + e.what();
-    throw SceneError(std::move(one));
+    files::refuse({file}, std::string("cannot be read: ") + e.what());
   }
 }
-
-Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy) {
-  return Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-         Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-         Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX());
-}
-
-Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vector3d& position) {
-  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
-  out.linear() = orientation.toRotationMatrix();
-  out.translation() = position;
-  return out;
-}
-
-Eigen::Matrix3d mended_inertia(const Eigen::Matrix3d& inertia) {
-  const double scale = inertia.cwiseAbs().maxCoeff();
-  const linalg::SymmetricEigen<3> eigen = linalg::symmetric_eigen(inertia / scale);
-  Eigen::Vector3d moment = eigen.values;
-  moment = moment.cwiseMax(1e-6 * moment[2]);
-  const double lacking = std::max(0.0, moment[2] * (1 + 1e-9) - moment[0] - moment[1]);
-  moment[0] += lacking / 2;
-  moment[1] += lacking / 2;
-  const Eigen::Matrix3d out = eigen.vectors * moment.asDiagonal() * eigen.vectors.transpose();
-  return scale / 2 * (out + out.transpose());
-}
-
-void add_mass(double mass, const Eigen::Vector3d& centre, const Eigen::Matrix3d& inertia,
-              double& total, Eigen::Vector3d& common, Eigen::Matrix3d& sum) {
-  const auto about = [](double m, const Eigen::Vector3d& d) {
-    return Eigen::Matrix3d(m * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose()));
-  };
-  sum += inertia;
-  if (!(mass > 0)) return;
-  if (!(total > 0)) {
-    total = mass;
-    common = centre;
-    return;
-  }
-  const Eigen::Vector3d now = (total * common + mass * centre) / (total + mass);
-  sum += about(total, common - now) + about(mass, centre - now);
-  total += mass;
-  common = now;
-}
-
-namespace {
-
-constexpr std::size_t kMostNames = 10000;  // of a line
-
-}  // namespace
 
 void Remarks::add(const std::string& what, const std::string& name) {
   const auto [found, is_new] = index_.emplace(what, lines_.size());
   if (is_new) lines_.push_back({what, {}, 0});
   Line& line = lines_[found->second];
   ++line.count;
-  if (!name.empty() && line.names.size() < kMostNames) line.names.push_back(name);
+  if (!name.empty() && line.names.size() < kMostListed) line.names.push_back(name);
 }
 
 std::vector<std::string> Remarks::lines() const {
@@ -179,7 +124,7 @@ std::vector<std::string> Remarks::lines() const {
     sort_unique(names);
     if (!names.empty())
       out.push_back(fmt::format("{}: {}{}", line.what, fmt::join(names, ", "),
-                                line.names.size() < kMostNames ? "" : ", ..."));
+                                line.names.size() < kMostListed ? "" : ", ..."));
     else
       out.push_back(line.count > 1 ? fmt::format("{} ({} times)", line.what, line.count)
                                    : line.what);

@@ -1,18 +1,15 @@
 // Tether: meshes of robots. SPDX-License-Identifier: BSD-3-Clause
-#include "import/mesh.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <tether/linalg/convex_hull.hpp>
 
-#include "geometry/shape_type.hpp"
 #include "geometry/surface_files.hpp"
+#include "robot.hpp"
+#include "xml.hpp"
 
 namespace tether::scene::import {
-
-using Eigen::Vector3d;
 
 namespace {
 

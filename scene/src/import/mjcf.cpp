@@ -2,32 +2,29 @@
 //
 // Bodies stand inside each other; a body without joints is welded to the one around it, one with
 // several moves by them in turn. Things of the world that touch become links of their own.
+#include "mjcf.hpp"
+
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <tether/linalg/symmetric_eigen.hpp>
 
 #include "bounds.hpp"
-#include "lists.hpp"
-#include "mjcf_actuators.hpp"
-#include "mjcf_geom.hpp"
 
 namespace tether::scene::import {
 
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 using mjcf::Geom;
 using mjcf::InertiaFrom;
+using mjcf::Names;
 using mjcf::Settings;
 
 /// Elements have a class from those around them, and from <frame> and <replicate> a place in the
 /// frame of their link and an end of their names.
 struct Around {
   std::string class_name;
-  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  Isometry3d frame = Isometry3d::Identity();
   std::string suffix = {};
 };
 
@@ -44,6 +41,7 @@ class Reader {
 
  private:
   void children(const Node& node, int link, const Around& around);
+  void child(const Node& node, int link, const Around& around);
   void frame(const Node& node, int link, Around around);
   void replicate(const Node& node, int link, const Around& around);
   void body(const Node& node, int parent, const Around& around);
@@ -51,7 +49,7 @@ class Reader {
   void geom(const Node& node, int link, const Around& around);
   void inertial(const Node& node, int link);
   void take_name(int line, const std::string& name, const char* kind, std::set<std::string>& names);
-  Link& link(int k) { return model_.links[static_cast<std::size_t>(k)]; }
+  Link& link(int k) { return model_.links[at(k)]; }
 
   Model& model_;
   const Settings& settings_;
@@ -60,6 +58,8 @@ class Reader {
   std::set<int> weighed_;     // links that <inertial> gives mass
   std::size_t repeated_ = 0;  // bodies and geoms of <replicate>
 };
+
+bool is_joint(const Node& node) { return is(node, "joint") || is(node, "freejoint"); }
 
 void Reader::take_name(int line, const std::string& name, const char* kind,
                        std::set<std::string>& names) {
@@ -70,42 +70,34 @@ void Reader::take_name(int line, const std::string& name, const char* kind,
 
 void Reader::children(const Node& node, int of, const Around& around) {
   // Geoms last: whether they give mass is known then.
-  for (const Node* each = node.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
-    if (of >= 0 && (is(*each, "joint") || is(*each, "freejoint")))
+  for (const Node* each : elements(node))
+    if (of >= 0 && is_joint(*each))
       joint(*each, of, around);
     else if (of >= 0 && is(*each, "inertial"))
       inertial(*each, of);
-  }
-  for (const Node* each = node.FirstChildElement("geom"); each != nullptr;
-       each = each->NextSiblingElement("geom"))
-    geom(*each, of, around);
-  for (const Node* each = node.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
-    if (is(*each, "body")) {
-      body(*each, of, around);
-    } else if (is(*each, "frame")) {
-      frame(*each, of, around);
-    } else if (is(*each, "replicate")) {
-      replicate(*each, of, around);
-    } else if (is(*each, "light") || is(*each, "camera") || is(*each, "site")) {
-      model_.remarks.add(fmt::format("<{}>", each->Name()));
-    } else if (is(*each, "composite") || is(*each, "flexcomp") || is(*each, "attach")) {
-      problems_.add(each->GetLineNum(), path(*each), "",
-                    "is not read; MuJoCo writes the model without it (mj_saveLastXML, or save in "
-                    "its viewer)");
-    } else if (!is(*each, "geom") && !(of >= 0 && (is(*each, "joint") || is(*each, "freejoint") ||
-                                                   is(*each, "inertial")))) {
-      model_.remarks.add(fmt::format("<{}> in <{}>", each->Name(), node.Name()),
-                         name_or_line(*each));
-    }
-  }
+  for (const Node* each : elements(node, "geom")) geom(*each, of, around);
+  for (const Node* each : elements(node)) child(*each, of, around);
+}
+
+void Reader::child(const Node& node, int of, const Around& around) {
+  if (is(node, "geom") || (of >= 0 && (is_joint(node) || is(node, "inertial")))) return;  // read
+  if (is(node, "body")) return body(node, of, around);
+  if (is(node, "frame")) return frame(node, of, around);
+  if (is(node, "replicate")) return replicate(node, of, around);
+  if (is(node, "light") || is(node, "camera") || is(node, "site"))
+    return model_.remarks.add(fmt::format("<{}>", node.Name()));
+  if (is(node, "composite") || is(node, "flexcomp") || is(node, "attach"))
+    return problems_.add(node, "",
+                         "is not read; MuJoCo writes the model without it (mj_saveLastXML, or save "
+                         "in its viewer)");
+  model_.remarks.add(fmt::format("<{}> in <{}>", node.Name(), node.Parent()->Value()),
+                     name_or_line(node));
 }
 
 void Reader::frame(const Node& node, int of, Around around) {
   Tag tag(node, problems_);
   const Vector3d at = tag.vector("pos", Vector3d::Zero());
-  around.frame = around.frame * placed(mjcf::read_orientation(tag, settings_), at);
+  around.frame = around.frame * placed(settings_.orientation(tag), at);
   around.class_name = tag.text("childclass", around.class_name);
   tag.finish(model_.remarks, {"name"});
   children(node, of, around);
@@ -123,20 +115,19 @@ void Reader::replicate(const Node& node, int of, const Around& around) {
   Around copy = around;
   copy.class_name = tag.text("childclass", around.class_name);
   const std::string separator = tag.text("sep");
-  constexpr std::size_t kLongestSuffix = 200;  // bytes
-  if (!files::is_name("x" + separator) || separator.size() + around.suffix.size() > kLongestSuffix)
+  if (!files::is_name("x" + separator) || separator.size() + around.suffix.size() > kLongestName)
     return tag.wrong("sep", std::string("must be part of a name: it ") + files::kName);
   tag.finish(model_.remarks);
   const std::size_t digits = fmt::format("{}", count).size();
   Vector3d at = Vector3d::Zero();
   for (int k = 0; k < count && problems_.clean(); ++k) {
-    const Eigen::Quaterniond turn = mjcf::from_euler(k * angles, settings_);
+    const Quaterniond turn = settings_.from_euler(k * angles);
     copy.frame = around.frame * placed(turn, at);
     copy.suffix = fmt::format("{}{:0{}}", separator, k, digits) + around.suffix;
     at += turn * offset;
     children(node, of, copy);
     if (++repeated_ > kMostListed)
-      problems_.add(node.GetLineNum(), path(node), "",
+      problems_.add(node, "",
                     fmt::format("all copies have at most {} bodies and geoms", kMostListed));
   }
 }
@@ -151,8 +142,8 @@ void Reader::body(const Node& node, int parent, const Around& around) {
                              : fmt::format("body {}", bodies_.size() + 1);
   take_name(out.line, out.name, "body", bodies_);
   const Vector3d at = tag.vector("pos", Vector3d::Zero());
-  out.pose = around.frame * placed(mjcf::read_orientation(tag, settings_), at);
-  const Around inside{tag.text("childclass", around.class_name), Eigen::Isometry3d::Identity(),
+  out.pose = around.frame * placed(settings_.orientation(tag), at);
+  const Around inside{tag.text("childclass", around.class_name), Isometry3d::Identity(),
                       around.suffix};
   tag.finish(model_.remarks, {"user"});
   const int index = static_cast<int>(model_.links.size());
@@ -161,49 +152,40 @@ void Reader::body(const Node& node, int parent, const Around& around) {
 }
 
 void Reader::joint(const Node& node, int of, const Around& around) {
+  static const std::map<std::string, std::optional<JointKind>> kinds{{"hinge", JointKind::hinge},
+                                                                     {"slide", JointKind::slider},
+                                                                     {"ball", JointKind::ball},
+                                                                     {"free", std::nullopt}};
   const bool is_freejoint = is(node, "freejoint");
-  Tag own(node, problems_);
   Tag tag(node, problems_,
-          is_freejoint ? nullptr
-                       : settings_.defaults(node, own.text("class", around.class_name), problems_));
+          is_freejoint ? nullptr : settings_.defaults(node, around.class_name, problems_));
   LinkJoint out;
   out.line = tag.line();
   out.name = tag.has("name")
                  ? tag.name("name", "") + around.suffix
                  : fmt::format("joint {} of {}", link(of).joints.size() + 1, link(of).name);
   take_name(out.line, out.name, "joint", joints_);
-  const std::string type = is_freejoint ? "free" : tag.text("type", "hinge");
-  out.kind = type == "slide"  ? MotionKind::slide
-             : type == "ball" ? MotionKind::ball
-             : type == "free" ? MotionKind::free
-                              : MotionKind::hinge;
-  if (out.kind == MotionKind::hinge && type != "hinge")
-    tag.wrong("type", "must be hinge, slide, ball or free");
-  if (out.kind == MotionKind::free && link(of).parent >= 0)
-    problems_.add(out.line, path(node), "", "a free joint is of bodies in the world only");
-  const bool turns = out.kind == MotionKind::hinge;
-  const auto value = [&](double x) { return turns ? settings_.angle(x) : x; };
+  const auto kind = kinds.find(
+      is_freejoint ? "free" : tag.word("type", "hinge", {"hinge", "slide", "ball", "free"}));
+  if (kind != kinds.end()) out.kind = kind->second;
+  if (!out.kind && link(of).parent >= 0)
+    problems_.add(node, "", "a free joint is of bodies in the world only");
+  const double unit = out.kind == JointKind::hinge ? settings_.angle : 1;
   out.axis = around.frame.linear() * tag.direction("axis", Vector3d::UnitZ());
   out.at = around.frame * tag.vector("pos", Vector3d::Zero());
-  out.reference = value(tag.number("ref", 0));
-  out.rest = value(tag.number("springref", 0));
-  out.stiffness = tag.not_negative("stiffness", 0);
-  out.damping = tag.not_negative("damping", 0);
-  out.friction = tag.not_negative("frictionloss", 0);
-  out.armature = tag.not_negative("armature", 0);
-  const std::string limited = tag.text("limited", "auto");
-  if (limited != "auto" && limited != "true" && limited != "false")
-    tag.wrong("limited", "must be true, false or auto");
-  const std::vector<double> range = tag.numbers("range", 2, 2);
-  const bool is_limited = limited == "true" || (limited == "auto" && settings_.autolimits);
-  if (is_limited && !range.empty() && out.kind != MotionKind::free) {
-    if (out.kind == MotionKind::ball)
-      model_.remarks.add("limits of ball joints", out.name);
-    else if (!(range[0] < range[1]))
-      tag.wrong("range", "must be two numbers, the smaller one first");
-    else
-      out.limits = {value(range[0]), value(range[1])};
-  }
+  out.reference = unit * tag.number("ref", 0);
+  out.rest = unit * tag.number("springref", 0);
+  for (const auto& [key, to] : {std::pair("stiffness", &out.stiffness),
+                                {"damping", &out.damping},
+                                {"frictionloss", &out.friction},
+                                {"armature", &out.armature}})
+    *to = tag.not_negative(key, 0);
+  const std::vector<double> range = settings_.range(tag, "range", "limited");
+  if (out.kind == JointKind::ball && !range.empty())
+    model_.remarks.add("limits of ball joints", out.name);
+  else if (out.kind)
+    out.limits = mjcf::limits_of(tag, "range", range);
+  if (out.limits) out.limits = {unit * out.limits->first, unit * out.limits->second};
   tag.finish(model_.remarks, {"class", "group", "user"});
   link(of).joints.push_back(std::move(out));
 }
@@ -212,71 +194,60 @@ void Reader::inertial(const Node& node, int of) {
   if (settings_.inertia == InertiaFrom::geoms) return;
   Tag tag(node, problems_);
   Link& out = link(of);
-  if (!weighed_.insert(of).second) return problems_.add(tag.line(), path(node), "", "stands twice");
+  if (!weighed_.insert(of).second) return problems_.add(node, "", "stands twice");
   if (!tag.has("mass")) tag.missing("mass", "kg");
   out.mass = tag.not_negative("mass", 0);
   out.centre = tag.vector("pos", Vector3d::Zero());
-  const Matrix3d R = mjcf::read_orientation(tag, settings_).toRotationMatrix();
+  const Matrix3d R = settings_.orientation(tag).toRotationMatrix();
   Matrix3d inertia = Matrix3d::Zero();
   if (const auto full = tag.numbers("fullinertia", 6, 6); !full.empty())
     inertia << full[0], full[3], full[4], full[3], full[1], full[5], full[4], full[5], full[2];
   else
     inertia = tag.vector("diaginertia", Vector3d::Zero()).asDiagonal();
-  const Matrix3d turned = R * inertia * R.transpose();
-  out.inertia = R == Matrix3d::Identity() ? inertia : Matrix3d((turned + turned.transpose()) / 2);
+  out.inertia = rotated(R, inertia);
   tag.finish(model_.remarks);
-}
-
-void move(const Eigen::Isometry3d& frame, Geom& geom) {
-  if (frame.matrix() == Eigen::Matrix4d::Identity()) return;  // would only add rounding
-  const Matrix3d R = frame.linear(), turned = R * geom.inertia * R.transpose();
-  geom.centre = frame * geom.centre;
-  geom.inertia = (turned + turned.transpose()) / 2;
-  if (!geom.shape) return;
-  geom.shape->position = frame * geom.shape->position;
-  geom.shape->orientation = Eigen::Quaterniond(R) * geom.shape->orientation;
 }
 
 void Reader::geom(const Node& node, int of, const Around& around) {
   if (!around.suffix.empty() && ++repeated_ > kMostListed) return;
   Geom geom = mjcf::read_geom(node, around.class_name, settings_, problems_, model_.remarks);
-  move(around.frame, geom);
-  const bool plane = geom.shape && geom.shape->kind == ShapeKind::plane;
   if (of < 0) {  // of the world
-    if (!geom.shape) return;
+    if (geom.shapes.empty()) return;
+    geom.mass = 0;
+    geom.inertia.setZero();
     Link out;
     out.line = node.GetLineNum();
     out.name =
         geom.name.empty() ? fmt::format("geom of line {}", out.line) : geom.name + around.suffix;
     out.scenery = true;
-    out.shapes.push_back(std::move(*geom.shape));
-    if (geom.touches) out.touch = geom.touch;
+    out.add(geom, around.frame);
     model_.links.push_back(std::move(out));
     return;
   }
   Link& out = link(of);
-  if (plane)
-    return problems_.add(node.GetLineNum(), path(node), "", "a plane stands in the world only");
+  if (!geom.shapes.empty() && geom.shapes[0].kind == ShapeKind::plane)
+    return problems_.add(node, "", "a plane stands in the world only");
   const bool weighs = settings_.inertia == InertiaFrom::geoms ||
                       (settings_.inertia == InertiaFrom::as_said && weighed_.count(of) == 0);
-  if (weighs && geom.has_mass && geom.mass < 0)
-    problems_.add(node.GetLineNum(), path(node) + ": type", "",
+  if (weighs && geom.mass < 0)
+    problems_.add(node, "type",
                   "the mass of a mesh is not known here: give the body an <inertial>, or the geom "
                   "mass=\"0\"");
-  if (weighs && geom.has_mass)
-    add_mass(geom.mass, geom.centre, geom.inertia, out.mass, out.centre, out.inertia);
-  if (!geom.shape) return;
-  if (!geom.touches)
-    return model_.remarks.add("geoms that touch nothing by their contype and conaffinity",
-                              geom.name.empty() ? name_or_line(node) : geom.name);
-  out.shapes.push_back(std::move(*geom.shape));
-  if (!out.touch) {
-    out.touch = geom.touch;
-    return;
+  if (!weighs) {
+    geom.mass = 0;
+    geom.inertia.setZero();
   }
-  if (out.touch->friction != geom.touch.friction || out.touch->tangential != geom.touch.tangential)
+  if (!geom.touch && !geom.shapes.empty()) {
+    geom.shapes.clear();
+    model_.remarks.add("geoms that touch nothing by their contype and conaffinity",
+                       geom.name.empty() ? name_or_line(node) : geom.name);
+  }
+  if (geom.shapes.empty()) geom.touch.reset();
+  if (out.touch && geom.touch &&
+      (out.touch->friction != geom.touch->friction ||
+       out.touch->tangential != geom.touch->tangential))
     model_.remarks.add("bodies whose geoms differ in friction have the largest of it", out.name);
-  out.touch->join(geom.touch);
+  out.add(geom, around.frame);
 }
 
 /// All three principal moments become their mean where one exceeds the sum of the others.
@@ -317,35 +288,28 @@ void set_total_mass(double total, Model& model) {
 Model read_mjcf(const Node& root, Problems& problems) {
   Model model;
   Tag tag(root, problems);
-  model.format = "MJCF";
-  model.touches_itself = true;
+  model.format = Format::mjcf;
   model.name = tag.text("model");
   const Settings settings = mjcf::read_settings(root, model, problems);
   Reader reader(model, settings, problems);
-  bool has_world = false;
-  for (const Node* each = root.FirstChildElement("worldbody"); each != nullptr;
-       each = each->NextSiblingElement("worldbody")) {
-    has_world = true;
-    reader.world(*each);
-  }
-  if (!has_world) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");
+  const std::vector<const Node*> worlds = elements(root, "worldbody");
+  for (const Node* each : worlds) reader.world(*each);
+  if (worlds.empty()) problems.add(root.GetLineNum(), "mujoco: worldbody", "", "is missing");
   Names names(model);
   mjcf::read_tendons(root, settings, names, model, problems);
-  const auto is_read = [](const Node& section) {
-    return any_of(std::array{"compiler", "option", "default", "tendon", "worldbody"},
-                  [&](const char* name) { return is(section, name); });
-  };
-  for (const Node* each = root.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement())
-    for (const Node* part = is_read(*each) ? nullptr : each->FirstChildElement(); part != nullptr;
-         part = part->NextSiblingElement())
-      if (is(*each, "contact") && is(*part, "exclude"))
-        read_excluded(*part, names, model, problems);
-      else if (is(*each, "actuator"))
-        mjcf::read_actuator(*part, settings, names, model, problems);
-      else if (!is(*each, "equality") || !read_equality(*part, names, model, problems))
-        model.remarks.add(fmt::format("<{}> in <{}>", part->Name(), each->Name()),
-                          part->Attribute("name") != nullptr ? name_or_line(*part) : "");
+  for (const Node* section : elements(root)) {
+    if (any_of(std::array{"compiler", "option", "default", "tendon", "worldbody"},
+               [&](const char* name) { return is(*section, name); }))
+      continue;
+    for (const Node* each : elements(*section))
+      if (is(*section, "contact") && is(*each, "exclude"))
+        read_excluded(*each, names, model, problems);
+      else if (is(*section, "actuator"))
+        mjcf::read_actuator(*each, settings, names, model, problems);
+      else if (!is(*section, "equality") || !mjcf::read_equality(*each, names, model, problems))
+        model.remarks.add(fmt::format("<{}> in <{}>", each->Name(), section->Name()),
+                          each->Attribute("name") != nullptr ? name_or_line(*each) : "");
+  }
   if (settings.balance_inertia && problems.clean()) balance_inertia(model);
   set_total_mass(settings.total_mass, model);
   return model;

@@ -1,26 +1,21 @@
 // Tether: settings of an MJCF file, classes of its elements and its meshes.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mjcf_settings.hpp"
-
 #include <fmt/format.h>
 
 #include <tether/linalg/shortest_turn.hpp>
 
-#include "mesh.hpp"
+#include "mjcf.hpp"
 
 namespace tether::scene::import::mjcf {
 
 using Eigen::AngleAxisd;
-using Eigen::Quaterniond;
-using Eigen::Vector3d;
 
 namespace {
 
 void read_compiler(const Node& node, Settings& out, Problems& problems, Remarks& remarks) {
   Tag tag(node, problems);
-  const std::string angle = tag.text("angle", out.degrees ? "degree" : "radian");
-  if (angle != "degree" && angle != "radian") tag.wrong("angle", "must be degree or radian");
-  out.degrees = angle == "degree";
+  if (tag.has("angle"))
+    out.angle = tag.word("angle", "", {"degree", "radian"}) == "degree" ? linalg::kPi / 180 : 1;
   out.autolimits = tag.flag("autolimits", out.autolimits);
   if (tag.text("coordinate", "local") != "local")
     tag.wrong("coordinate", "must be local; global ones were dropped by MuJoCo 2.3.4");
@@ -29,9 +24,7 @@ void read_compiler(const Node& node, Settings& out, Problems& problems, Remarks&
     tag.wrong("eulerseq", "must be three of the letters x, y, z, X, Y, Z");
     out.euler = "xyz";  // orientations are read on, for further errors
   }
-  const std::string from = tag.text("inertiafromgeom", "auto");
-  if (from != "auto" && from != "true" && from != "false")
-    tag.wrong("inertiafromgeom", "must be true, false or auto");
+  const std::string from = tag.word("inertiafromgeom", "auto", {"true", "false", "auto"});
   out.inertia = from == "true"    ? InertiaFrom::geoms
                 : from == "false" ? InertiaFrom::inertial
                                   : InertiaFrom::as_said;
@@ -88,50 +81,28 @@ void read_class(const Node& node, const std::string* around, Settings& out, Prob
     const auto& outer = out.classes[*around];
     out.copied += size_of(outer);  // a few lines may copy what many others say
     if (out.copied > kMostInClasses)
-      return problems.add(node.GetLineNum(), path(node), "",
+      return problems.add(node, "",
                           fmt::format("all classes together have at most {} attributes, with those "
                                       "of the classes around them",
                                       kMostInClasses));
     own = outer;
   }
-  for (const Node* each = node.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
+  for (const Node* each : elements(node)) {
     if (is(*each, "default")) continue;
     Attributes& of = own[each->Name()];
     for (const auto* a = each->FirstAttribute(); a != nullptr; a = a->Next())
       of[a->Name()] = a->Value();
     if (of.size() > kMostAttributes)
-      return problems.add(each->GetLineNum(), path(*each), "",
+      return problems.add(*each, "",
                           fmt::format("must have at most {} attributes", kMostAttributes));
   }
-  for (const Node* each = node.FirstChildElement("default"); each != nullptr;
-       each = each->NextSiblingElement("default"))
+  for (const Node* each : elements(node, "default"))
     read_class(*each, &name, out, problems, remarks);
 }
 
-}  // namespace
-
-const Attributes* Settings::defaults(const Node& node, const std::string& name, Problems& problems,
-                                     std::string_view element) const {
-  auto found = classes.find(name);
-  const bool is_outermost = name.empty() || outermost.count(name) > 0;
-  if (found == classes.end() && is_outermost) found = classes.find("");
-  if (found == classes.end()) {
-    if (!is_outermost)
-      problems.add(node.GetLineNum(), path(node) + ": class", "\"" + name + "\"",
-                   "no <default> has this class");
-    return nullptr;
-  }
-  const auto of = found->second.find(element.empty() ? node.Name() : std::string(element));
-  return of == found->second.end() ? nullptr : &of->second;
-}
-
-namespace {
-
 /// A mesh by its file or its vertices, without triangles then.
 void read_mesh_asset(const Node& node, Settings& out, Problems& problems, Remarks& remarks) {
-  Tag own(node, problems);
-  Tag tag(node, problems, out.defaults(node, own.text("class"), problems));
+  Tag tag(node, problems, out.defaults(node, "", problems));
   const std::string file = tag.text("file");
   std::string stem = file.substr(std::min(file.find_last_of('/') + 1, file.size()));
   stem = stem.substr(0, stem.find_last_of('.'));
@@ -160,34 +131,62 @@ void read_mesh_asset(const Node& node, Settings& out, Problems& problems, Remark
 
 Settings read_settings(const Node& root, Model& model, Problems& problems) {
   Settings out;
-  model.gravity = Vector3d(0, 0, -9.81);
-  for (const Node* each = root.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
+  for (const Node* each : elements(root)) {
     if (is(*each, "compiler")) read_compiler(*each, out, problems, model.remarks);
     if (is(*each, "option")) read_option(*each, model, problems);
     if (is(*each, "default")) read_class(*each, nullptr, out, problems, model.remarks);
   }
-  for (const Node* each = root.FirstChildElement("asset"); each != nullptr;
-       each = each->NextSiblingElement("asset"))
-    for (const Node* mesh = each->FirstChildElement("mesh"); mesh != nullptr;
-         mesh = mesh->NextSiblingElement("mesh"))
+  for (const Node* each : elements(root, "asset"))
+    for (const Node* mesh : elements(*each, "mesh"))
       read_mesh_asset(*mesh, out, problems, model.remarks);
   return out;
 }
 
-Quaterniond from_euler(const Vector3d& angles, const Settings& settings) {
+const Attributes* Settings::defaults(const Node& node, const std::string& otherwise,
+                                     Problems& problems, std::string_view element) const {
+  const char* const own = node.Attribute("class");
+  const std::string name = own != nullptr ? own : otherwise;
+  auto found = classes.find(name);
+  const bool is_outermost = name.empty() || outermost.count(name) > 0;
+  if (found == classes.end() && is_outermost) found = classes.find("");
+  if (found == classes.end()) {
+    if (!is_outermost)
+      problems.add(node.GetLineNum(), path(node) + ": class", "\"" + name + "\"",
+                   "no <default> has this class");
+    return nullptr;
+  }
+  const auto of = found->second.find(element.empty() ? node.Name() : std::string(element));
+  return of == found->second.end() ? nullptr : &of->second;
+}
+
+std::vector<double> Settings::range(Tag& tag, const char* key, const char* limited) const {
+  const std::string word = tag.word(limited, "auto", {"true", "false", "auto"});
+  std::vector<double> range = tag.numbers(key, 2, 2);
+  if (word == "false" || (word == "auto" && !autolimits)) range.clear();
+  return range;
+}
+
+std::optional<std::pair<double, double>> limits_of(Tag& tag, const char* key,
+                                                   const std::vector<double>& range) {
+  if (range.empty()) return {};
+  if (range[0] < range[1]) return std::pair(range[0], range[1]);
+  tag.wrong(key, "must be two numbers, the smaller one first");
+  return {};
+}
+
+Quaterniond Settings::from_euler(const Vector3d& angles) const {
   Quaterniond out = Quaterniond::Identity();
   for (int k = 0; k < 3; ++k) {
-    const char letter = settings.euler[static_cast<std::size_t>(k)];
+    const char letter = euler[at(k)];
     const bool fixed = letter < 'a';
     const Vector3d axis = Vector3d::Unit(letter - (fixed ? 'X' : 'x'));
-    const Quaterniond turn(AngleAxisd(settings.angle(angles[k]), axis));
+    const Quaterniond turn(AngleAxisd(angle * angles[k], axis));
     out = fixed ? turn * out : out * turn;
   }
   return out;
 }
 
-Quaterniond read_orientation(Tag& tag, const Settings& settings) {
+Quaterniond Settings::orientation(Tag& tag) const {
   if (const auto q = tag.numbers("quat", 4, 4); !q.empty()) {
     const Quaterniond read(q[0], q[1], q[2], q[3]);
     if (read.coeffs().stableNorm() > 0) return Quaterniond(read.coeffs().stableNormalized());
@@ -195,16 +194,16 @@ Quaterniond read_orientation(Tag& tag, const Settings& settings) {
   } else if (const auto a = tag.numbers("axisangle", 4, 4); !a.empty()) {
     const Vector3d axis(a[0], a[1], a[2]);
     if (axis.stableNorm() > 0)
-      return Quaterniond(AngleAxisd(settings.angle(a[3]), axis.stableNormalized()));
+      return Quaterniond(AngleAxisd(angle * a[3], axis.stableNormalized()));
     tag.wrong("axisangle", "must have an axis that is not zero");
   } else if (const auto e = tag.numbers("euler", 3, 3); !e.empty()) {
-    return from_euler({e[0], e[1], e[2]}, settings);
+    return from_euler({e[0], e[1], e[2]});
   } else if (const auto v = tag.numbers("xyaxes", 6, 6); !v.empty()) {
     const Vector3d x = Vector3d(v[0], v[1], v[2]).stableNormalized();
     const Vector3d y = Vector3d(v[3], v[4], v[5]).stableNormalized();
     const Vector3d z = x.cross(y);
     if (z.norm() > 1e-9) {
-      Eigen::Matrix3d R;
+      Matrix3d R;
       R << x, z.normalized().cross(x), z.normalized();
       return Quaterniond(R);
     }

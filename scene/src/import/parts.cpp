@@ -5,86 +5,80 @@
 
 #include <cmath>
 #include <tether/linalg/pi.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 
-#include "geometry/shape_type.hpp"
-#include "import.hpp"
-#include "robot.hpp"
+#include "bounds.hpp"
 
 namespace tether::scene::import {
 
 namespace {
 
-struct LinkStart {
-  std::vector<PlacedJoint> joints;  ///< those that move
-  Eigen::Isometry3d pose;           ///< in the world
-  Eigen::Isometry3d weld;           ///< in the frame of the parent
-};
-
 using Eigen::AngleAxisd;
-using Eigen::Isometry3d;
 using Eigen::Translation3d;
 
-bool has_coordinate(const LinkJoint& joint) {
-  return joint.kind == MotionKind::hinge || joint.kind == MotionKind::slide;
+constexpr double kSmallRadius = 1e-3;  // m, of gyration, where a mass has no inertia
+constexpr double kNoMass = 1e-12;      // of the whole: the round-off of a program that wrote it
+
+struct LinkStart {
+  std::vector<PlacedJoint> joints;  ///< those that move
+  Isometry3d pose;                  ///< in the world
+  Isometry3d weld;                  ///< in the frame of the parent
+};
+
+std::map<std::string, const LinkJoint*> joints_of(const Model& model) {
+  std::map<std::string, const LinkJoint*> all;
+  for (const Link& link : model.links)
+    for (const LinkJoint& joint : link.joints) all[joint.name] = &joint;
+  return all;
 }
 
 /// Refuses names that no joint has.
 void check_names(const Model& model, const ImportOptions& options) {
-  std::map<std::string, const LinkJoint*> all;
-  std::string known;
-  for (const Link& link : model.links)
-    for (const LinkJoint& joint : link.joints) {
-      all[joint.name] = &joint;
-      if (all.size() <= 30) known += (known.empty() ? "" : ", ") + joint.name;
-    }
-  const auto look = [&](const char* option, const std::string& name) {
-    const auto found = all.find(name);
-    if (found == all.end())
-      throw std::invalid_argument(shown(fmt::format(
-          "{} {}: no joint that moves has this name; {}{}", option, name,
-          known.empty() ? "none does" : "there are " + known, all.size() > 30 ? ", ..." : "")));
-    return found->second;
+  const auto refuse = [](const std::string& why) { throw std::invalid_argument(shown(why)); };
+  const std::map<std::string, const LinkJoint*> all = joints_of(model);
+  const auto demand_joint = [&](const char* option, const std::string& name) {
+    if (all.count(name) > 0) return;
+    std::string known;
+    std::size_t count = 0;
+    for (const Link& link : model.links)
+      for (const LinkJoint& joint : link.joints)
+        if (++count <= kMostSuggested) known += (known.empty() ? "" : ", ") + joint.name;
+    refuse(fmt::format("{} {}: no joint that moves has this name; {}{}", option, name,
+                       known.empty() ? "none does" : "there are " + known,
+                       count > kMostSuggested ? ", ..." : ""));
   };
   for (const auto& [name, value] : options.positions) {
-    const LinkJoint& joint = *look("--joint", name);
-    if (!has_coordinate(joint))
-      throw std::invalid_argument(
-          fmt::format("--joint {}: is no hinge or slider, whose position is one number", name));
+    demand_joint("--joint", name);
+    const LinkJoint& joint = *all.at(name);
+    if (!joint.has_coordinate())
+      refuse(fmt::format("--joint {}: is no hinge or slider, whose position is one number", name));
     if (options.joint_laws && joint.limits &&
         !(value >= joint.limits->first && value <= joint.limits->second))
-      throw std::invalid_argument(fmt::format("--joint {}={}: its limits are {} and {}", name,
-                                              value, joint.limits->first, joint.limits->second));
+      refuse(fmt::format("--joint {}={}: its limits are {} and {}", name, value,
+                         joint.limits->first, joint.limits->second));
   }
-  for (const std::string& name : options.held) look("--hold", name);
+  for (const std::string& name : options.held) demand_joint("--hold", name);
   for (const auto& [name, value] : options.controls) {
     const auto drive = std::find_if(model.drives.begin(), model.drives.end(),
                                     [&n = name](const Drive& each) { return each.name == n; });
     if (drive == model.drives.end())
-      throw std::invalid_argument(
-          shown(fmt::format("--control {}: no actuator that is taken over has this name", name)));
-    if (drive->has_activation)
-      throw std::invalid_argument(
-          shown(fmt::format("--control {}: acts through a state, which scenes do not have", name)));
+      refuse(fmt::format("--control {}: no actuator that is taken over has this name", name));
+    if (!drive->gain)
+      refuse(fmt::format("--control {}: acts through a state, which scenes do not have", name));
   }
 }
 
-const LinkJoint* find_joint(const Model& model, const std::string& name) {
-  for (const Link& link : model.links)
-    for (const LinkJoint& joint : link.joints)
-      if (joint.name == name) return &joint;
-  return nullptr;
-}
-
-// `depth`: of joints that follow each other in a circle the last one stands as if alone.
-double value_of(const LinkJoint& joint, const ImportOptions& options, const Model& model,
-                Remarks& remarks, std::size_t depth = 0) {
+// `depth`: of so many joints that follow each other in a circle the last one stands as if alone.
+double value_of(const LinkJoint& joint, const ImportOptions& options,
+                const std::map<std::string, const LinkJoint*>& all, Remarks& remarks,
+                std::size_t depth) {
   for (const auto& [name, value] : options.positions)
     if (name == joint.name) return value;
-  if (joint.mimic && depth < model.links.size())
-    if (const LinkJoint* of = find_joint(model, joint.mimic->of))
-      return joint.mimic->multiplier * value_of(*of, options, model, remarks, depth + 1) +
+  if (joint.mimic && depth > 0)
+    if (const auto of = all.find(joint.mimic->of); of != all.end())
+      return joint.mimic->multiplier * value_of(*of->second, options, all, remarks, depth - 1) +
              joint.mimic->offset;
-  if (!joint.limits || !options.joint_laws || !has_coordinate(joint)) return joint.reference;
+  if (!joint.limits || !options.joint_laws || !joint.has_coordinate()) return joint.reference;
   const auto [lower, upper] = *joint.limits;
   if (joint.reference < lower || joint.reference > upper)
     remarks.add(
@@ -95,51 +89,24 @@ double value_of(const LinkJoint& joint, const ImportOptions& options, const Mode
 }
 
 Isometry3d moved(const LinkJoint& joint, double way) {
-  if (joint.kind == MotionKind::slide) return Isometry3d(Translation3d(way * joint.axis));
+  if (joint.kind == JointKind::slider) return Isometry3d(Translation3d(way * joint.axis));
   return Translation3d(joint.at) * AngleAxisd(way, joint.axis) * Translation3d(-joint.at);
 }
 
 /// Joints that --base gives a link in the world.
 std::vector<LinkJoint> base_joints(const Link& link, Base base) {
   if (base == Base::as_file || link.scenery) return link.joints;
+  std::vector<LinkJoint> out;
   if (base == Base::free) {
-    LinkJoint free;
-    free.kind = MotionKind::free;
+    LinkJoint& free = out.emplace_back();
+    free.kind.reset();
     free.name = "base";
     free.line = link.line;
-    return {free};
+    return out;
   }
-  std::vector<LinkJoint> out;
   for (const LinkJoint& joint : link.joints)
-    if (joint.kind != MotionKind::free) out.push_back(joint);
+    if (joint.kind) out.push_back(joint);
   return out;
-}
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
-constexpr double kSmallRadius = 1e-3;  // m, of gyration, where a mass has no inertia
-constexpr double kNoMass = 1e-12;      // of the whole: the round-off of a program that wrote it
-
-std::size_t at(int k) { return static_cast<std::size_t>(k); }
-
-/// Takes a link in, `place`: its frame in that of the part.
-void weld(const Link& link, const Isometry3d& place, Part& part) {
-  part.links.push_back(link.name);
-  part.places.push_back(place);
-  const Matrix3d R = place.linear(), turned = R * link.inertia * R.transpose();
-  // Turning by the identity would only add rounding.
-  const Matrix3d inertia =
-      R == Matrix3d::Identity() ? link.inertia : Matrix3d((turned + turned.transpose()) / 2);
-  add_mass(link.mass, place * link.centre, inertia, part.mass, part.centre, part.inertia);
-  for (Shape shape : link.shapes) {
-    shape.position = place * shape.position;
-    shape.orientation = Eigen::Quaterniond(R) * shape.orientation;
-    part.shapes.push_back(std::move(shape));
-  }
-  if (!link.touch) return;
-  if (!part.touch) part.touch = link.touch;
-  part.touch->join(*link.touch);
 }
 
 std::vector<Part> welded(const Model& model, const std::vector<LinkStart>& starts) {
@@ -151,21 +118,20 @@ std::vector<Part> welded(const Model& model, const std::vector<LinkStart>& start
     const int above = link.parent < 0 ? -1 : part_of[at(link.parent)];
     const bool is_new = above < 0 || !starts[k].joints.empty();
     if (is_new) {
-      Part part;
+      Part& part = parts.emplace_back();
       part.name = link.name;
       part.line = link.line;
       part.parent = above;
       part.joints = starts[k].joints;
       part.pose = starts[k].pose;
       part.scenery = link.scenery;
-      part_of.push_back(static_cast<int>(parts.size()));
-      place.push_back(Isometry3d::Identity());
-      parts.push_back(std::move(part));
-    } else {
-      part_of.push_back(above);
-      place.push_back(place[at(link.parent)] * starts[k].weld);
     }
-    weld(link, place.back(), parts[at(part_of.back())]);
+    part_of.push_back(is_new ? static_cast<int>(parts.size()) - 1 : above);
+    place.push_back(is_new ? Isometry3d::Identity() : place[at(link.parent)] * starts[k].weld);
+    Part& part = parts[at(part_of.back())];
+    part.links.push_back(link.name);
+    part.places.push_back(place.back());
+    part.add(link, place.back());
   }
   return parts;
 }
@@ -250,16 +216,33 @@ bool is_small(const Vector3d& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() < kLargestLength;
 }
 
+bool is_small(const Part& part) {
+  return is_small(part.pose.translation()) && is_small(part.centre) &&
+         all_of(part.joints, [](const PlacedJoint& joint) { return is_small(joint.at); }) &&
+         all_of(part.shapes, [](const Shape& shape) {
+           return is_small(shape.position) && is_small(shape.size) &&
+                  std::max(shape.radius, shape.length) < kLargestLength &&
+                  all_of(shape.points, [](const Vector3d& p) { return is_small(p); });
+         });
+}
+
+/// The nearest inertia that a body may have: negative and vanishing moments become small ones, then
+/// the smaller two of the moments grow alike until they carry the largest.
+Matrix3d mended_inertia(const Matrix3d& inertia) {
+  const double scale = inertia.cwiseAbs().maxCoeff();
+  const linalg::SymmetricEigen<3> eigen = linalg::symmetric_eigen(inertia / scale);
+  Vector3d moment = eigen.values;
+  moment = moment.cwiseMax(1e-6 * moment[2]);
+  const double lacking = std::max(0.0, moment[2] * (1 + 1e-9) - moment[0] - moment[1]);
+  moment[0] += lacking / 2;
+  moment[1] += lacking / 2;
+  const Matrix3d out = eigen.vectors * moment.asDiagonal() * eigen.vectors.transpose();
+  return scale / 2 * (out + out.transpose());
+}
+
 void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
   const std::string called = fmt::format("link \"{}\"", part.name);
-  bool small = is_small(part.pose.translation()) && is_small(part.centre);
-  for (const Shape& shape : part.shapes) {
-    small = small && is_small(shape.position) && is_small(shape.size) &&
-            std::max(shape.radius, shape.length) < kLargestLength;
-    for (const Vector3d& p : shape.points) small = small && is_small(p);
-  }
-  for (const PlacedJoint& joint : part.joints) small = small && is_small(joint.at);
-  if (!small)
+  if (!is_small(part))
     problems.add(part.line, called, "",
                  fmt::format("has a place or size beyond {:g} m", kLargestLength));
   if (part.fixed()) return;
@@ -290,38 +273,33 @@ void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
           "; --mend takes the nearest ones");
 }
 
-}  // namespace
-
 /// Marks the joints that need a coordinate for what acts on several.
 void find_common_laws(Model& model, const ImportOptions& options) {
-  std::set<std::string> driven, summed;
+  std::set<std::string> common;
   for (const Drive& drive : model.drives)
     for (const Transmission& to : drive.to)
-      if (!law_of(drive, options).isZero(0)) driven.insert(to.joint);
+      if (!law_of(drive, options).isZero(0)) common.insert(to.joint);
   for (const KeptSum& sum : model.kept_sums)
-    for (const Transmission& term : sum.terms) summed.insert(term.joint);
+    for (const Transmission& term : sum.terms) common.insert(term.joint);
   for (Link& link : model.links)
-    for (LinkJoint& joint : link.joints) {
-      joint.is_driven = driven.count(joint.name) > 0;
-      joint.is_summed = summed.count(joint.name) > 0;
-    }
+    for (LinkJoint& joint : link.joints) joint.has_common_law = common.count(joint.name) > 0;
 }
 
 std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
-  check_names(model, options);
-  find_common_laws(model, options);
+  const std::map<std::string, const LinkJoint*> all = joints_of(model);
   std::vector<LinkStart> out;
   for (const Link& link : model.links) {
     LinkStart start;
     start.weld = link.pose;
     const bool base = link.parent < 0;
-    Isometry3d pose =
-        base ? link.pose : out[static_cast<std::size_t>(link.parent)].pose * link.pose;
-    if (base && !link.scenery) pose.pretranslate(Eigen::Vector3d(0, 0, options.height));
+    Isometry3d pose = base ? link.pose : out[at(link.parent)].pose * link.pose;
+    if (base && !link.scenery) pose.pretranslate(Vector3d(0, 0, options.height));
     for (const LinkJoint& joint : base ? base_joints(link, options.base) : link.joints) {
-      PlacedJoint placed{joint, pose.linear() * joint.axis, pose * joint.at, 0};
-      if (has_coordinate(joint)) {
-        placed.value = value_of(joint, options, model, model.remarks);
+      PlacedJoint placed{joint};
+      placed.axis = pose.linear() * joint.axis;
+      placed.at = pose * joint.at;
+      if (joint.has_coordinate()) {
+        placed.value = value_of(joint, options, all, model.remarks, model.links.size());
         const double way = placed.value - joint.reference;
         // Turning by nothing would only add rounding.
         if (way != 0) {
@@ -330,7 +308,7 @@ std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
           start.weld = start.weld * motion;
         }
       }
-      const bool has_no_range = options.joint_laws && has_coordinate(joint) && joint.limits &&
+      const bool has_no_range = options.joint_laws && joint.has_coordinate() && joint.limits &&
                                 joint.limits->first == joint.limits->second;
       if (options.held.count(joint.name) == 0 && !has_no_range)
         start.joints.push_back(std::move(placed));
@@ -341,22 +319,53 @@ std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
   return out;
 }
 
-double inertia_about_joints(const Part& part) {
-  double out = part.inertia.cwiseAbs().maxCoeff();
-  for (const PlacedJoint& each : part.joints)
-    out += part.mass * (each.at - part.pose * part.centre).squaredNorm();
+}  // namespace
+
+Isometry3d placed(const Quaterniond& orientation, const Vector3d& position) {
+  Isometry3d out = Isometry3d::Identity();
+  out.linear() = orientation.toRotationMatrix();
+  out.translation() = position;
+  return out;
+}
+
+void Matter::add(const Matter& part, const Isometry3d& place) {
+  inertia += rotated(place.linear(), part.inertia);
+  const Vector3d there = place * part.centre;
+  if (part.mass > 0 && mass > 0) {
+    const Vector3d now = (mass * centre + part.mass * there) / (mass + part.mass);
+    inertia += mass * point_inertia(centre - now) + part.mass * point_inertia(there - now);
+    mass += part.mass;
+    centre = now;
+  } else if (part.mass > 0) {
+    mass = part.mass;
+    centre = there;
+  }
+  for (Shape shape : part.shapes) {
+    shape.position = place * shape.position;
+    shape.orientation = Quaterniond(place.linear()) * shape.orientation;
+    shapes.push_back(std::move(shape));
+  }
+  if (!part.touch) return;
+  if (!touch) touch = part.touch;
+  touch->join(*part.touch);
+}
+
+double Part::inertia_about_joints() const {
+  double out = inertia.cwiseAbs().maxCoeff();
+  for (const PlacedJoint& each : joints) out += mass * (each.at - pose * centre).squaredNorm();
   return out;
 }
 
 bool has_wide_limits(const LinkJoint& joint) {
-  return joint.kind == MotionKind::hinge && joint.limits &&
+  return joint.kind == JointKind::hinge && joint.limits &&
          !(joint.limits->second - joint.limits->first < 2 * linalg::kPi);
 }
 
 std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problems& problems) {
   if (options.density) weigh_shapes(model, *options.density);
-  const std::vector<LinkStart> starts = starts_of(model, options);
-  std::vector<Part> parts = welded(model, starts);
+  check_names(model, options);
+  find_common_laws(model, options);
+  std::vector<Part> parts = welded(model, starts_of(model, options));
   drop_round_off(parts, model.remarks);
   fold_massless(parts, model.remarks, problems);
   if (problems.clean()) check_moves(model, parts, problems);

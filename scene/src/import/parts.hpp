@@ -7,36 +7,29 @@
 
 namespace tether::scene::import {
 
-/// A joint at the start, in world axes.
-struct PlacedJoint {
-  LinkJoint law;
-  Eigen::Vector3d axis, at;
+/// A joint at the start, its axis and point in world axes.
+struct PlacedJoint : LinkJoint {
   double value = 0;  ///< of its coordinate, as the file counts it
 };
 
 /// Links that are welded to each other, as one body in the frame of the first of them.
-struct Part {
+struct Part : Matter {
   std::string name;
   std::vector<std::string> links;
-  std::vector<Eigen::Isometry3d> places;  ///< of the links, in the frame of the first
-  int line = 0, parent = -1;              ///< an earlier part; -1: the world
-  std::vector<PlacedJoint> joints;        ///< none: fixed
-  bool fixed() const { return joints.empty(); }
-  bool gone = false;  ///< folded into another one, or left out
+  std::vector<Isometry3d> places;   ///< of the links, in the frame of the first
+  int line = 0, parent = -1;        ///< an earlier part; -1: the world
+  std::vector<PlacedJoint> joints;  ///< none: fixed
+  bool gone = false;                ///< folded into another one, or left out
   bool scenery = false;
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< in the world
-  double mass = 0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< in the frame of the first link
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre
-  std::vector<Shape> shapes;                          ///< in the frame of the first link
-  std::optional<Touch> touch;
+  Isometry3d pose = Isometry3d::Identity();  ///< in the world
+
+  bool fixed() const { return joints.empty(); }
+  /// At most, kg m^2.
+  double inertia_about_joints() const;
 };
 
 /// Small bodies have this part of the mass or inertia of the one that they carry.
 constexpr double kSmallBody = 1e-6;
-
-/// At most, kg m^2.
-double inertia_about_joints(const Part& part);
 
 /// Limits that the angle of a hinge of scenes, which is one of all turns, does not tell.
 bool has_wide_limits(const LinkJoint& joint);
@@ -50,27 +43,20 @@ std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problem
 struct Draft {
   Scene scene;
   std::vector<std::string> body_comments, joint_comments;
+
+  /// Their numbers.
+  int add(Body body, std::string comment);
+  int add(Joint joint, std::string comment);
 };
 
 /// The force of an actuator is (1, length, speed) . this, before its bounds.
-Eigen::Vector3d law_of(const Drive& drive, const ImportOptions& options);
+Vector3d law_of(const Drive& drive, const ImportOptions& options);
 
 /// Adds couplings, what actuators exert, and bodies for the armature of hinges and sliders.
 void add_common_laws(const Model& model, const std::vector<Part>& parts,
                      const ImportOptions& options, Draft& draft, Remarks& remarks);
 
-/// Adds the joints that carry `part`, which is the body `body`, on the body `on` (-1: the world).
-/// Several joints without laws are one where scenes have it (universal, ball, planar, none), else
-/// small bodies stand between them.
-void add_joints(const Part& part, int body, int on, const ImportOptions& options, Draft& draft,
-                Remarks& remarks);
-
 Draft make_draft(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
                  Remarks& remarks);
-
-/// Adds a ball or fixed joint for each closure of the model, at the start. `body_of`: of each part,
-/// -1: the world.
-void add_closures(const Model& model, const std::vector<Part>& parts,
-                  const std::vector<int>& body_of, Draft& draft, Remarks& remarks);
 
 }  // namespace tether::scene::import

@@ -9,13 +9,20 @@
 #include <tether/scene/scene.hpp>
 #include <tuple>
 
+#include "geometry/shape_type.hpp"
+
 namespace tether::scene::import {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using linalg::at;
 
 /// One line for each kind of thing, with the names of all that it concerns.
 class Remarks {
  public:
   void add(const std::string& what, const std::string& name = "");
-  bool empty() const { return lines_.empty(); }
   /// "what: a, b, c" or "what (3)", in the order of their first appearance.
   std::vector<std::string> lines() const;
 
@@ -29,8 +36,6 @@ class Remarks {
   std::map<std::string, std::size_t> index_;
 };
 
-enum class MotionKind { hinge, slide, ball, free, planar };
-
 /// A joint follows another one: multiplier (its coordinate) + offset.
 struct Mimic {
   std::string of;
@@ -41,19 +46,20 @@ struct Mimic {
 /// the link stands at `pose`.
 struct LinkJoint {
   std::string name;
-  MotionKind kind = MotionKind::hinge;
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< length 1, in the frame of the link
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();     ///< in the frame of the link, m
+  std::optional<JointKind> kind = JointKind::hinge;  ///< hinge, slider, ball, planar; none: free
+  Vector3d axis = Vector3d::UnitZ();                 ///< length 1, in the frame of the link
+  Vector3d at = Vector3d::Zero();                    ///< in the frame of the link, m
   std::optional<std::pair<double, double>> limits;
   double reference = 0;
   double friction = 0;                ///< N m, N
   double stiffness = 0, damping = 0;  ///< N/m, N s/m: of slides; N m/rad, N m s: of hinges
   double armature = 0;                ///< kg m^2, kg: inertia of a rotor
-  bool is_driven = false;             ///< by an actuator that exerts something
-  bool is_summed = false;             ///< in a kept sum
+  bool has_common_law = false;        ///< in a kept sum, or driven by what exerts something
   double rest = 0;                    ///< of the stiffness
   std::optional<Mimic> mimic;
   int line = 0;
+
+  bool has_coordinate() const { return kind == JointKind::hinge || kind == JointKind::slider; }
 };
 
 /// How the surface of a link meets others: MuJoCo's rules, of which a URDF uses the defaults.
@@ -76,26 +82,33 @@ struct Touch {
   }
 };
 
-struct Link {
+/// What weighs and touches as one, in a frame of its own.
+struct Matter {
+  double mass = 0;                      ///< kg
+  Vector3d centre = Vector3d::Zero();   ///< m
+  Matrix3d inertia = Matrix3d::Zero();  ///< about the centre
+  std::vector<Shape> shapes;            ///< that touch
+  std::optional<Touch> touch;           ///< none: its shapes touch nothing
+
+  /// Adds what has its frame at `place`.
+  void add(const Matter& part, const Isometry3d& place);
+};
+
+struct Link : Matter {
   std::string name;
   int parent = -1;  ///< an earlier link; -1: the world
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  std::vector<LinkJoint> joints;                      ///< none: welded to its parent
-  double mass = 0;                                    ///< kg
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< m, in the frame of the link
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre, axes of the link
-  std::vector<Shape> shapes;                          ///< that touch, in the frame of the link
-  std::optional<Touch> touch;                         ///< none: its shapes touch nothing
-  bool scenery = false;                               ///< a thing of the world, not of the robot
-  bool is_weighed = true;                             ///< false: the file gives no mass
+  Isometry3d pose = Isometry3d::Identity();
+  std::vector<LinkJoint> joints;  ///< none: welded to its parent
+  bool scenery = false;           ///< a thing of the world, not of the robot
+  bool is_weighed = true;         ///< false: the file gives no mass
   int line = 0;
 };
 
 /// Two links that are held to each other beside the tree; "world": the world.
 struct Closure {
   std::string name, first, second;
-  bool weld = false;                             ///< false: at one point
-  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in the frame of the first, m
+  JointKind kind = JointKind::ball;  ///< or fixed
+  Vector3d at = Vector3d::Zero();    ///< in the frame of the first, m
   int line = 0;
 };
 
@@ -109,9 +122,9 @@ struct Transmission {
 struct Drive {
   std::string name;
   std::vector<Transmission> to;  ///< none: it pulls at something else
-  Eigen::Vector3d gain = Eigen::Vector3d::Zero(), bias = Eigen::Vector3d::Zero();
+  std::optional<Vector3d> gain;  ///< none: its control acts through a state, which starts at 0
+  Vector3d bias = Vector3d::Zero();
   std::optional<std::pair<double, double>> control, force;
-  bool has_activation = false;  ///< its control acts through a state, which starts at 0
   int line = 0;
 };
 
@@ -121,14 +134,17 @@ struct KeptSum {
   std::vector<Transmission> terms;
 };
 
+/// Whether the base of a URDF is fixed is up to who uses it, and its links pass through each other.
+/// In MJCF moving links touch each other, but for neighbours in the tree.
+enum class Format { urdf, mjcf };
+
 struct Model {
-  std::string name, format;
+  std::string name;
+  Format format = Format::urdf;
   std::vector<Link> links;  ///< parents before children
-  std::optional<Eigen::Vector3d> gravity;
-  double step = 0;              ///< s; 0: not said
-  bool base_is_said = true;     ///< false: whether the base is fixed is up to who uses the file
-  bool touches_itself = false;  ///< moving links touch each other, but for neighbours in the tree
-  bool touches = true;          ///< false: nothing touches anything
+  std::optional<Vector3d> gravity = Vector3d(0, 0, -9.81);
+  double step = 0;      ///< s; 0: not said
+  bool touches = true;  ///< false: nothing touches anything
   std::vector<Closure> closures;
   std::vector<Drive> drives;
   std::map<std::string, std::vector<Transmission>> tendons;  ///< fixed ones
@@ -137,20 +153,17 @@ struct Model {
   Remarks remarks;
 };
 
-/// Fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), rad.
-Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy);
-
-Eigen::Isometry3d placed(const Eigen::Quaterniond& orientation, const Eigen::Vector3d& position);
+Isometry3d placed(const Quaterniond& orientation, const Vector3d& position);
 
 /// Shapes must have no larger or smaller numbers: m.
 constexpr double kLargestLength = 1e9;
 
-/// The nearest inertia that a body may have: negative and vanishing moments become small ones, then
-/// the smaller two of the moments grow alike until they carry the largest.
-Eigen::Matrix3d mended_inertia(const Eigen::Matrix3d& inertia);
+/// The convex hull of a mesh, but for points that are hardly above it; nothing, with a remark,
+/// where it is flat.
+std::optional<Shape> hull_of(const Shape& mesh, const std::string& of, Remarks& remarks);
 
-/// Adds a part to a sum of parts: masses, their common centre, inertias about it.
-void add_mass(double mass, const Eigen::Vector3d& centre, const Eigen::Matrix3d& inertia,
-              double& total, Eigen::Vector3d& common, Eigen::Matrix3d& sum);
+/// Puts convex parts in the place of meshes, or with a remark the hull of one that bounds no solid
+/// or needs too many parts, or `as_hulls` of all.
+void make_convex(Model& model, bool as_hulls);
 
 }  // namespace tether::scene::import

@@ -4,9 +4,6 @@
 // `axis` is in its own. Inertias are about the centre of mass in the axes of <inertial>.
 #include <fmt/format.h>
 
-#include <cstring>
-
-#include "mesh.hpp"
 #include "robot.hpp"
 #include "xml.hpp"
 
@@ -16,7 +13,7 @@ namespace {
 
 struct UrdfJoint {
   std::string name, parent, child;
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  Isometry3d pose = Isometry3d::Identity();
   std::vector<LinkJoint> joints;  ///< none: fixed
   int line = 0;
 };
@@ -46,14 +43,12 @@ Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joint
     if (!names.emplace(joint.name, 0).second)
       problems.add(joint.line, path + "name", "", "another joint has it already");
     const auto parent = index.find(joint.parent), child = index.find(joint.child);
-    if (parent == index.end())
-      problems.add(joint.line, path + "parent", fmt::format("\"{}\"", joint.parent),
-                   "there is no such link");
-    if (child == index.end())
-      problems.add(joint.line, path + "child", fmt::format("\"{}\"", joint.child),
-                   "there is no such link");
+    for (const auto& [found, key, name] :
+         {std::tuple(parent, "parent", &joint.parent), {child, "child", &joint.child}})
+      if (found == index.end())
+        problems.add(joint.line, path + key, fmt::format("\"{}\"", *name), "there is no such link");
     if (parent == index.end() || child == index.end()) continue;
-    const UrdfJoint*& carrier = out.carrier[static_cast<std::size_t>(child->second)];
+    const UrdfJoint*& carrier = out.carrier[at(child->second)];
     if (carrier != nullptr) {
       problems.add(joint.line, path + "child", fmt::format("\"{}\"", joint.child),
                    fmt::format("is carried by joint \"{}\" already; closed loops are no URDF",
@@ -61,7 +56,7 @@ Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joint
       continue;
     }
     carrier = &joint;
-    out.children[static_cast<std::size_t>(parent->second)].push_back(child->second);
+    out.children[at(parent->second)].push_back(child->second);
   }
   for (const UrdfJoint& joint : joints)
     for (const LinkJoint& law : joint.joints)
@@ -70,10 +65,6 @@ Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joint
                      fmt::format("\"{}\"", law.mimic->of), "there is no such joint");
   return out;
 }
-
-using Eigen::Isometry3d;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 /// The only child of that name; null: there is none.
 const Node* only_child(const Node& node, const char* name, Problems& problems) {
@@ -85,13 +76,9 @@ const Node* only_child(const Node& node, const char* name, Problems& problems) {
 }
 
 void name_children(const Node& node, std::initializer_list<const char*> known, Remarks& remarks) {
-  for (const Node* each = node.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
-    bool is_known = false;
-    for (const char* name : known) is_known = is_known || is(*each, name);
-    if (!is_known)
+  for (const Node* each : elements(node))
+    if (!any_of(known, [&](const char* name) { return is(*each, name); }))
       remarks.add(fmt::format("<{}> in <{}>", each->Name(), node.Name()), name_or_line(node));
-  }
 }
 
 Isometry3d read_origin(const Node& node, Problems& problems, Remarks& remarks) {
@@ -101,7 +88,9 @@ Isometry3d read_origin(const Node& node, Problems& problems, Remarks& remarks) {
   const Vector3d xyz = tag.vector("xyz", Vector3d::Zero()),
                  rpy = tag.vector("rpy", Vector3d::Zero());
   tag.finish(remarks);
-  return placed(from_rpy(rpy), xyz);
+  // Fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll).
+  const auto turn = [&](int k) { return Eigen::AngleAxisd(rpy[k], Vector3d::Unit(k)); };
+  return placed(turn(2) * turn(1) * turn(0), xyz);
 }
 
 void read_inertial(const Node& node, Link& link, Problems& problems, Remarks& remarks) {
@@ -113,12 +102,11 @@ void read_inertial(const Node& node, Link& link, Problems& problems, Remarks& re
     link.mass = tag.not_negative("value", 0);
     tag.finish(remarks);
   } else {
-    problems.add(node.GetLineNum(), path(node) + ": mass", "", "is missing: <mass value=\"kg\"/>");
+    problems.add(node, "mass", "is missing: <mass value=\"kg\"/>");
   }
   const Node* const inertia = only_child(node, "inertia", problems);
   if (inertia == nullptr)
-    return problems.add(node.GetLineNum(), path(node) + ": inertia", "",
-                        "is missing: ixx, ixy, ixz, iyy, iyz, izz in kg m^2");
+    return problems.add(node, "inertia", "is missing: ixx, ixy, ixz, iyy, iyz, izz in kg m^2");
   Tag tag(*inertia, problems);
   const auto entry = [&](const char* key) {
     if (!tag.has(key)) tag.missing(key, "kg m^2");
@@ -129,42 +117,33 @@ void read_inertial(const Node& node, Link& link, Problems& problems, Remarks& re
   tag.finish(remarks);
   Matrix3d matrix;
   matrix << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  const Matrix3d turned = origin.linear() * matrix * origin.linear().transpose();
-  // Turning by the identity would only add rounding.
-  link.inertia = origin.linear() == Matrix3d::Identity()
-                     ? matrix
-                     : Matrix3d((turned + turned.transpose()) / 2);
+  link.inertia = rotated(origin.linear(), matrix);
   name_children(node, {"origin", "mass", "inertia"}, remarks);
 }
 
-/// Nothing where scenes have no such shape, or where it has no size.
+/// Nothing where it has no size.
 std::optional<Shape> read_geometry(const Node& node, Problems& problems, Remarks& remarks) {
   Tag tag(node, problems);
-  const auto size_of = [&](const char* key) {
-    if (!tag.has(key)) tag.missing(key, "m");
-    return tag.not_negative(key, 0);
-  };
   Shape shape;
-  double least = 0;
-  if (is(node, "sphere")) {
-    least = shape.radius = size_of("radius");
-  } else if (is(node, "box")) {
+  double least = HUGE_VAL;
+  if (is(node, "box")) {
     shape.kind = ShapeKind::box;
     if (!tag.has("size")) tag.missing("size", "the full edges, m");
     shape.size = tag.vector("size", Vector3d::Zero());
     least = shape.size.minCoeff();
     if (!(least >= 0)) tag.wrong("size", "must be three numbers > 0");
-  } else if (is(node, "cylinder") || is(node, "capsule")) {
-    shape.kind = is(node, "cylinder") ? ShapeKind::cylinder : ShapeKind::capsule;
-    shape.radius = size_of("radius");
-    shape.length = size_of("length");
-    least = std::min(shape.radius, shape.length);
   } else {
-    return {};
+    shape.kind = is(node, "sphere")     ? ShapeKind::sphere
+                 : is(node, "cylinder") ? ShapeKind::cylinder
+                                        : ShapeKind::capsule;
+    for (const auto& [key, to] : {std::pair("radius", &shape.radius), {"length", &shape.length}}) {
+      if (shape.kind == ShapeKind::sphere && to == &shape.length) continue;
+      if (!tag.has(key)) tag.missing(key, "m");
+      least = std::min(least, *to = tag.not_negative(key, 0));
+    }
   }
   tag.finish(remarks);
-  if (least > 0) return shape;
-  return {};
+  return least > 0 ? std::optional(shape) : std::nullopt;
 }
 
 std::optional<Shape> read_urdf_mesh(const Node& node, const std::string& link, Problems& problems,
@@ -182,18 +161,19 @@ void read_collision(const Node& node, Link& link, Problems& problems, Remarks& r
   const Node* const geometry = only_child(node, "geometry", problems);
   const Node* const kind = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
   if (kind == nullptr)
-    return problems.add(node.GetLineNum(), path(node) + ": geometry", "",
-                        "is missing: a box, cylinder, sphere, capsule or mesh");
-  const bool is_mesh = is(*kind, "mesh");
-  std::optional<Shape> shape = is_mesh ? read_urdf_mesh(*kind, link.name, problems, remarks)
-                                       : read_geometry(*kind, problems, remarks);
-  if (!shape && !is_mesh) {
-    const bool known =
-        is(*kind, "box") || is(*kind, "sphere") || is(*kind, "cylinder") || is(*kind, "capsule");
+    return problems.add(node, "geometry", "is missing: a box, cylinder, sphere, capsule or mesh");
+  const bool is_mesh = is(*kind, "mesh"),
+             known = any_of(std::array{"box", "sphere", "cylinder", "capsule"},
+                            [&](const char*k) { return is(*kind, k); });
+  std::optional<Shape> shape;
+  if (is_mesh)
+    shape = read_urdf_mesh(*kind, link.name, problems, remarks);
+  else if (known)
+    shape = read_geometry(*kind, problems, remarks);
+  if (!shape && !is_mesh)
     return remarks.add(
         fmt::format("collision geometry <{}>{}", kind->Name(), known ? " without size" : ""),
         link.name);
-  }
   if (shape) {
     shape->position = origin.translation();
     if (origin.linear() != Matrix3d::Identity()) shape->orientation = origin.linear();
@@ -213,8 +193,7 @@ Link read_link(const Node& node, Problems& problems, Remarks& remarks) {
     read_inertial(*inertial, link, problems, remarks);
   else
     link.is_weighed = false;
-  for (const Node* each = node.FirstChildElement("collision"); each != nullptr;
-       each = each->NextSiblingElement("collision"))
+  for (const Node* each : elements(node, "collision"))
     read_collision(*each, link, problems, remarks);
   if (node.FirstChildElement("visual") != nullptr)
     remarks.add("<visual>, which shows and does not touch");
@@ -274,10 +253,10 @@ void read_joint_parts(const Node& node, const std::string& type, LinkJoint& join
 }
 
 UrdfJoint read_joint(const Node& node, Problems& problems, Remarks& remarks) {
-  static const std::map<std::string, MotionKind> kinds{
-      {"revolute", MotionKind::hinge},  {"continuous", MotionKind::hinge},
-      {"prismatic", MotionKind::slide}, {"floating", MotionKind::free},
-      {"planar", MotionKind::planar},   {"spherical", MotionKind::ball}};
+  static const std::map<std::string, std::optional<JointKind>> kinds{
+      {"revolute", JointKind::hinge},   {"continuous", JointKind::hinge},
+      {"prismatic", JointKind::slider}, {"floating", std::nullopt},
+      {"planar", JointKind::planar},    {"spherical", JointKind::ball}};
   UrdfJoint out;
   Tag tag(node, problems);
   out.line = tag.line();
@@ -287,8 +266,7 @@ UrdfJoint read_joint(const Node& node, Problems& problems, Remarks& remarks) {
   const auto link_of = [&](const char* which) {
     const Node* const end = only_child(node, which, problems);
     if (end == nullptr) {
-      problems.add(node.GetLineNum(), path(node) + ": " + which, "",
-                   fmt::format("is missing: <{} link=\"...\"/>", which));
+      problems.add(node, which, fmt::format("is missing: <{} link=\"...\"/>", which));
       return std::string();
     }
     Tag of_end(*end, problems);
@@ -316,8 +294,6 @@ UrdfJoint read_joint(const Node& node, Problems& problems, Remarks& remarks) {
   return out;
 }
 
-}  // namespace
-
 std::vector<Link> in_tree_order(std::vector<Link> links, const std::vector<UrdfJoint>& joints,
                                 Problems& problems) {
   const Tree tree = tree_of(links, joints, problems);
@@ -329,14 +305,12 @@ std::vector<Link> in_tree_order(std::vector<Link> links, const std::vector<UrdfJ
         problems.add(links[k].line, fmt::format("link \"{}\"", links[k].name), "",
                      fmt::format("no joint carries it, as none carries \"{}\": one link is the "
                                  "base",
-                                 links[static_cast<std::size_t>(order[0])].name));
+                                 links[at(order[0])].name));
       order.push_back(static_cast<int>(k));
     }
   for (std::size_t next = 0; next < order.size(); ++next)
-    for (const int child : tree.children[static_cast<std::size_t>(order[next])])
-      order.push_back(child);
-  for (std::size_t k = 0; k < order.size(); ++k)
-    place[static_cast<std::size_t>(order[k])] = static_cast<int>(k);
+    for (const int child : tree.children[at(order[next])]) order.push_back(child);
+  for (std::size_t k = 0; k < order.size(); ++k) place[at(order[k])] = static_cast<int>(k);
   for (std::size_t k = 0; k < links.size(); ++k)
     if (place[k] < 0) {
       problems.add(links[k].line, fmt::format("link \"{}\"", links[k].name), "",
@@ -347,9 +321,9 @@ std::vector<Link> in_tree_order(std::vector<Link> links, const std::vector<UrdfJ
   std::vector<Link> out;
   const std::map<std::string, int> index = names_of(links, problems);
   for (const int k : order) {
-    Link link = std::move(links[static_cast<std::size_t>(k)]);
-    if (const UrdfJoint* joint = tree.carrier[static_cast<std::size_t>(k)]) {
-      link.parent = place[static_cast<std::size_t>(index.at(joint->parent))];
+    Link link = std::move(links[at(k)]);
+    if (const UrdfJoint* joint = tree.carrier[at(k)]) {
+      link.parent = place[at(index.at(joint->parent))];
       link.pose = joint->pose;
       link.joints = joint->joints;
     }
@@ -358,24 +332,21 @@ std::vector<Link> in_tree_order(std::vector<Link> links, const std::vector<UrdfJ
   return out;
 }
 
+}  // namespace
+
 Model read_urdf(const Node& root, Problems& problems) {
   Model model;
   Tag robot(root, problems);
-  model.format = "URDF";
   model.name = robot.text("name");
-  model.gravity = Vector3d(0, 0, -9.81);
-  model.base_is_said = false;
   std::vector<Link> links;
   std::vector<UrdfJoint> joints;
-  for (const Node* each = root.FirstChildElement(); each != nullptr;
-       each = each->NextSiblingElement()) {
+  for (const Node* each : elements(root)) {
     if (is(*each, "link"))
       links.push_back(read_link(*each, problems, model.remarks));
     else if (is(*each, "joint"))
       joints.push_back(read_joint(*each, problems, model.remarks));
-    else if (std::strncmp(each->Name(), "xacro:", 6) == 0)
-      problems.add(each->GetLineNum(), path(*each), "",
-                   "is xacro: expand it first (xacro FILE > robot.urdf)");
+    else if (std::string_view(each->Name()).substr(0, 6) == "xacro:")
+      problems.add(*each, "", "is xacro: expand it first (xacro FILE > robot.urdf)");
     else
       model.remarks.add(fmt::format("<{}>", each->Name()));
   }

@@ -13,8 +13,6 @@ namespace tether::scene::import {
 
 namespace {
 
-constexpr std::size_t kLongestName = 200;  // bytes; names stand in names and remarks made of them
-
 /// -1: all of it is UTF-8 without a zero; else the place of the first byte that is not.
 long bad_byte(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
@@ -146,7 +144,7 @@ Document::Document(std::string_view text, Problems& problems) {
     Inspection inspection(problems);
     xml_.Accept(&inspection);
     if (const Node* second = xml_.RootElement()->NextSiblingElement(); second != nullptr)
-      problems.add(second->GetLineNum(), path(*second), "", "a document has one root element");
+      problems.add(*second, "", "a document has one root element");
   }
   problems.finish();
 }
@@ -165,7 +163,7 @@ void Document::include_files(Problems& problems) {
 // As in MuJoCo files are seen from the folder of the first one, and none is included twice.
 void Document::include_files(Node& parent, int depth, Included& so_far, Problems& problems) {
   if (depth > static_cast<int>(TINYXML2_MAX_ELEMENT_DEPTH))
-    return problems.add(parent.GetLineNum(), path(parent), "",
+    return problems.add(parent, "",
                         fmt::format("with the files that are included, more than {} elements are "
                                     "inside each other",
                                     TINYXML2_MAX_ELEMENT_DEPTH));
@@ -187,8 +185,7 @@ void Document::include_files(Node& parent, int depth, Included& so_far, Problems
       Problems of_file(name, problems.folder());
       const Document other(text, of_file);
       tinyxml2::XMLNode* last = each;
-      for (const Node* part = other.root().FirstChildElement(); part != nullptr;
-           part = part->NextSiblingElement())
+      for (const Node* part : elements(other.root()))
         last = parent.InsertAfterChild(last, part->DeepClone(&xml_));
     } catch (const SurfaceError& e) {
       tag.wrong("file", e.what());
@@ -216,6 +213,14 @@ std::string name_or_line(const Node& node) {
 
 bool is(const Node& node, std::string_view name) { return node.Name() == name; }
 
+std::vector<const Node*> elements(const Node& node, const char* name) {
+  std::vector<const Node*> out;
+  for (const Node* each = node.FirstChildElement(name); each != nullptr;
+       each = each->NextSiblingElement(name))
+    out.push_back(each);
+  return out;
+}
+
 std::string shown(const std::string& text) {
   Problem problem;  // whose message goes to terminals
   problem.allowed = text;
@@ -233,6 +238,15 @@ const char* Tag::find(std::string_view key) {
 std::string Tag::text(std::string_view key, std::string_view otherwise) {
   const char* const found = find(key);
   return std::string(found != nullptr ? found : otherwise);
+}
+
+std::string Tag::word(std::string_view key, std::string_view otherwise,
+                      std::initializer_list<std::string_view> words) {
+  const std::string found = text(key, otherwise);
+  if (!contains(words, found))
+    wrong(key, fmt::format("must be {} or {}", fmt::join(words.begin(), words.end() - 1, ", "),
+                           *(words.end() - 1)));
+  return found;
 }
 
 std::string Tag::name(std::string_view key, std::string_view allowed) {
@@ -266,18 +280,16 @@ double Tag::not_negative(std::string_view key, double otherwise) {
 }
 
 bool Tag::flag(std::string_view key, bool otherwise) {
-  const std::string word = text(key, otherwise ? "true" : "false");
-  if (word != "true" && word != "false") wrong(key, "must be true or false");
-  return word == "true";
+  return word(key, otherwise ? "true" : "false", {"true", "false"}) == "true";
 }
 
-Eigen::Vector3d Tag::vector(std::string_view key, const Eigen::Vector3d& otherwise) {
+Vector3d Tag::vector(std::string_view key, const Vector3d& otherwise) {
   const std::vector<double> v = numbers(key, 3, 3);
-  return v.empty() ? otherwise : Eigen::Vector3d(v[0], v[1], v[2]);
+  return v.empty() ? otherwise : Vector3d(v[0], v[1], v[2]);
 }
 
-Eigen::Vector3d Tag::direction(std::string_view key, const Eigen::Vector3d& otherwise) {
-  const Eigen::Vector3d v = vector(key, otherwise);
+Vector3d Tag::direction(std::string_view key, const Vector3d& otherwise) {
+  const Vector3d v = vector(key, otherwise);
   if (v.stableNorm() > 0) return v.stableNormalized();
   wrong(key, "must be a direction, not zero");
   return otherwise;
@@ -307,19 +319,19 @@ void Tag::wrong(std::string_view key, std::string allowed) {
 }
 
 void Tag::missing(std::string_view key, std::string allowed) {
-  problems_.add(line(), path(node_) + ": " + std::string(key), "", "is missing: " + allowed);
+  problems_.add(node_, key, "is missing: " + allowed);
 }
 
 void Tag::finish(Remarks& remarks, const std::set<std::string, std::less<>>& no_matter) {
-  const auto look = [&](std::string_view key) {
+  const auto name_unread = [&](std::string_view key) {
     if (keys_read_.count(key) == 0 && no_matter.count(key) == 0)
       remarks.add(fmt::format("attribute {} of <{}>", key, node_.Name()), name_or_line(node_));
   };
   for (const auto* each = node_.FirstAttribute(); each != nullptr; each = each->Next())
-    look(each->Name());
+    name_unread(each->Name());
   if (defaults_ == nullptr) return;
   for (const auto& [key, value] : *defaults_)
-    if (node_.Attribute(key.c_str()) == nullptr) look(key);
+    if (node_.Attribute(key.c_str()) == nullptr) name_unread(key);
 }
 
 }  // namespace tether::scene::import

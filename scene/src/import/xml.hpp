@@ -1,7 +1,7 @@
 // Tether: XML elements with checked attributes. SPDX-License-Identifier: BSD-3-Clause
 //
-// Files are not trusted: size, depth, encoding, entities and character references are looked
-// at before anything is read from them.
+// Files are not trusted: size, depth, encoding, entities and character references are checked
+// before anything is read from them.
 #pragma once
 
 #include <tinyxml2.h>
@@ -17,6 +17,16 @@ using Node = tinyxml2::XMLElement;
 
 /// An element has no more; in MJCF they are 40. The parser compares each with all.
 constexpr std::size_t kMostAttributes = 100;
+/// Bytes; names stand in names and remarks made of them.
+constexpr std::size_t kLongestName = 200;
+
+/// `joint "elbow"`, or `link "arm": inertial: mass` for elements without a name.
+std::string path(const Node& node);
+/// The attribute `name`, or "line 12" of an element without one.
+std::string name_or_line(const Node& node);
+bool is(const Node& node, std::string_view name);
+/// The elements inside of one: those of a name, or all.
+std::vector<const Node*> elements(const Node& node, const char* name = nullptr);
 
 /// Collects what is wrong in a file, each with its line.
 class Problems : public files::Report {
@@ -30,6 +40,11 @@ class Problems : public files::Report {
   void add(int line, std::string field, std::string value, const std::string& allowed) {
     Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
                 line > 0 ? allowed : allowed + " (in a file that it includes)");
+  }
+  /// Of an element; `inside`: what is wrong in it.
+  void add(const Node& node, std::string_view inside, const std::string& allowed) {
+    add(node.GetLineNum(), path(node) + (inside.empty() ? "" : ": ") + std::string(inside), "",
+        allowed);
   }
 
  private:
@@ -53,12 +68,6 @@ class Document {
   tinyxml2::XMLDocument xml_;
 };
 
-/// `joint "elbow"`, or `link "arm": inertial: mass` for elements without a name.
-std::string path(const Node& node);
-/// The attribute `name`, or "line 12" of an element without one.
-std::string name_or_line(const Node& node);
-bool is(const Node& node, std::string_view name);
-
 /// Without what a terminal obeys in place of showing it.
 std::string shown(const std::string& text);
 
@@ -75,14 +84,17 @@ class Tag {
   const char* find(std::string_view key);  ///< null: it is not there
   bool has(std::string_view key) { return find(key) != nullptr; }
   std::string text(std::string_view key, std::string_view otherwise = "");
+  /// One of these words; another one is reported and returned.
+  std::string word(std::string_view key, std::string_view otherwise,
+                   std::initializer_list<std::string_view> words);
   std::string name(std::string_view key, std::string_view allowed);  ///< must be there
   double number(std::string_view key, double otherwise);
   double positive(std::string_view key, double otherwise);
   double not_negative(std::string_view key, double otherwise);
   bool flag(std::string_view key, bool otherwise);  ///< true or false
-  Eigen::Vector3d vector(std::string_view key, const Eigen::Vector3d& otherwise);
+  Vector3d vector(std::string_view key, const Vector3d& otherwise);
   /// A direction of any length but zero; returned with length 1.
-  Eigen::Vector3d direction(std::string_view key, const Eigen::Vector3d& otherwise);
+  Vector3d direction(std::string_view key, const Vector3d& otherwise);
   /// `least` to `most` finite numbers; empty if absent or wrong.
   std::vector<double> numbers(std::string_view key, std::size_t least, std::size_t most);
 
@@ -91,7 +103,6 @@ class Tag {
   /// Says which attributes nobody has asked for, beside those of `no_matter`.
   void finish(Remarks& remarks, const std::set<std::string, std::less<>>& no_matter = {});
 
-  const Node& node() const { return node_; }
   int line() const { return node_.GetLineNum(); }
 
  private:
@@ -107,19 +118,10 @@ Model read_urdf(const Node& root, Problems& problems);
 /// `root`: <mujoco>. Problems are reported; the model is of use where there are none.
 Model read_mjcf(const Node& root, Problems& problems);
 
-/// Names that an MJCF file gives, by kind. An attribute that names nothing of its kind is wrong.
-struct Names {
-  explicit Names(Model& model);
-  LinkJoint* joint(Tag& tag, const char* key) const;  ///< null: there is none
-  void tendon(Tag& tag, const char* key) const;
-  void body(Tag& tag, const char* key) const;
-
-  std::map<std::string, LinkJoint*> joints;
-  std::set<std::string> bodies, tendons, actuators;
-};
-
-/// Reads an element below <equality> of MJCF: connect and weld become closures, joint becomes a
-/// mimic, tendon a kept sum. False: it is none of them. After all joints and tendons.
-bool read_equality(const Node& node, const Names& names, Model& model, Problems& problems);
+/// The surface of a file of triangles in the folder of the problems or below, times `scale`. The
+/// folder of a package is that of the robot, or one of that name above it. Nothing, with a remark,
+/// where it is not there or none.
+std::optional<Shape> read_mesh(const Problems& robot, const std::string& name,
+                               const Vector3d& scale, const std::string& of, Remarks& remarks);
 
 }  // namespace tether::scene::import

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <tether/scene/engine.hpp>
 
-#include "coordinate.hpp"
-#include "effects/capstan.hpp"
+#include "effects/cable.hpp"
 #include "mechanics/force.hpp"
 
 namespace tether::scene::joints {
@@ -69,7 +68,7 @@ class Coordinate {
   const Frame<double>& B(const Bodies& bodies) const { return bodies.frames[at(second_)]; }
   template <class S>
   Vector3<S> span(const Frame<S>& A, const Frame<S>& B) const {
-    return Vector3<S>(point<0>(A, at_first_).x - point<0>(B, at_second_).x);
+    return between<0>(A, at_first_, B, at_second_).x;
   }
   template <class S>
   S turn(const Frame<S>& A, const Frame<S>& B) const;
@@ -106,11 +105,8 @@ void Coordinate::derivatives(const Frame<S>& A, const Frame<S>& B, S* s) const {
   s[0] = value(A, B);
   if constexpr (order == 0) return;
   if (what_ == MotionOf::length) {
-    Jet<S> d = point<order>(A, at_first_);
-    const Jet<S> b = point<order>(B, at_second_), u = mechanics::direction<order>(B, axis_);
-    d.x -= b.x;
-    if constexpr (order >= 1) d.x1 -= b.x1;
-    if constexpr (order >= 2) d.x2 -= b.x2;
+    const Jet<S> d = between<order>(A, at_first_, B, at_second_),
+                 u = mechanics::direction<order>(B, axis_);
     if constexpr (order >= 1) s[1] = product<1>(u, d);
     if constexpr (order >= 2) s[2] = product<2>(u, d);
     return;
@@ -174,8 +170,8 @@ void Coordinate::pull(const Frame<S>& A, const Frame<S>& B, const S& force, Wren
   }
   // A slider's acts on both bodies at the point of the first.
   const Vector3<S> p = point<0>(A, at_first_).x;
-  on_first.add(A, p, u);
-  on_second.add(B, fixed_direction_ ? p : point<0>(B, at_second_).x, Vector3<S>(-u));
+  add_opposite(A, p, B, fixed_direction_ ? p : Vector3<S>(point<0>(B, at_second_).x), u, on_first,
+               on_second);
 }
 
 // The turn Q = A start B' has the vector (angle / sine) (axis of Q - Q') / 2.

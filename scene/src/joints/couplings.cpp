@@ -117,14 +117,11 @@ double turn(const Scene& scene, const Coupling& coupling,
 
 namespace effects {
 
-using namespace mechanics;
-
 namespace {
 
-class CouplingEffect : public Effect {
- public:
-  void fields(const files::Form& root, Scene& scene) const override {
-    root.each("coupling", scene.couplings, [&](const files::Form& form, Coupling& coupling) {
+struct CouplingEffect : Effect {
+  void fields(const Form& root, Scene& scene) const override {
+    root.each("coupling", scene.couplings, [&](const Form& form, Coupling& coupling) {
       form.name("coupling", coupling.name);
       if (form.in()) return read_terms(*form.in(), *form.reader(), coupling);
       if (form.out()) write_terms(scene, coupling, *form.out());
@@ -132,12 +129,10 @@ class CouplingEffect : public Effect {
       return true;
     });
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     std::set<std::string> names;
     for (const Coupling& coupling : scene.couplings) {
-      if (!names.insert(coupling.name).second)
-        report.add(coupling.place, fmt::format("coupling \"{}\": name", coupling.name), "",
-                   "another one has it already");
+      check_name(coupling, "coupling", names, report);
       try {
         couplings::polynomials(scene, coupling);
       } catch (const std::invalid_argument& e) {
@@ -145,9 +140,8 @@ class CouplingEffect : public Effect {
       }
     }
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    if (!scene.couplings.empty())
-      lines.push_back({"couplings", counted(scene.couplings.size(), "coupling") + " of joints"});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "couplings", scene.couplings.size(), "coupling", " of joints");
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Coupling& coupling : momenta.scene.couplings)
@@ -161,25 +155,28 @@ class CouplingEffect : public Effect {
  private:
   static constexpr std::size_t kMostTerms = 16;
 
-  static bool read_terms(files::Fields& in, files::Reader& r, Coupling& coupling) {
-    read_joints(in, r, coupling);
+  static bool read_terms(Fields& in, Reader& r, Coupling& coupling) {
+    const std::map<std::string, int> joints = index_of(r.scene.joints);
+    for (const std::string& name :
+         r.names(in, "joints", 2, std::string::npos, "an array of two names of joints or more",
+                 "there is no joint", joints))
+      coupling.joints.push_back(joints.at(name));
     const std::size_t n = std::max<std::size_t>(2, coupling.joints.size());
     if (in.has("weights")) coupling.weights = in.numbers("weights", {n}, "");
-    if (const files::Value* list = in.find("polynomial"); list != nullptr) {
-      const std::size_t terms =
-          list->kind() == files::Value::Kind::array ? list->items().size() : 0;
+    if (const Value* list = in.find("polynomial"); list != nullptr) {
+      const std::size_t terms = list->kind() == Value::Kind::array ? list->items().size() : 0;
       coupling.polynomial =
           in.numbers("polynomial", {std::clamp<std::size_t>(terms, 1, kMostTerms)}, "");
     }
-    if (in.has("ratio")) coupling.polynomial = {in.number("ratio", 1, files::kAny, "")};
+    if (in.has("ratio")) coupling.polynomial = {in.number("ratio", 1, kAny, "")};
     if (in.has("ratio") + in.has("weights") + in.has("polynomial") != 1)
       in.missing("ratio", "give ratio (of two joints), weights or polynomial, one of the three");
     return !coupling.joints.empty();
   }
-  static void write_terms(const Scene& scene, const Coupling& coupling, files::Writer& out) {
+  static void write_terms(const Scene& scene, const Coupling& coupling, Writer& out) {
     std::vector<std::string> joints;
-    for (const int j : coupling.joints) joints.push_back(files::toml(scene.joints[at(j)].name));
-    out.raw("joints", "[" + files::list(joints) + "]");
+    for (const int j : coupling.joints) joints.push_back(scene.joints[at(j)].name);
+    out.field("joints", joints);
     if (coupling.polynomial.empty())
       out.field("weights", coupling.weights);
     else
@@ -194,28 +191,6 @@ class CouplingEffect : public Effect {
       coupling.weights[k] *= unit(k) / unit(0);
     double factor = 1 / unit(0);
     for (double& c : coupling.polynomial) c *= factor *= unit(1);
-  }
-  static void read_joints(files::Fields& in, files::Reader& r, Coupling& coupling) {
-    constexpr const char* kAllowed = "an array of two names of joints or more";
-    using Kind = files::Value::Kind;
-    const files::Value* names = in.find("joints");
-    if (names == nullptr) return in.missing("joints", kAllowed);
-    if (names->kind() != Kind::array || names->items().size() < 2)
-      return in.wrong("joints", std::string("must be ") + kAllowed);
-    std::map<std::string, int> joints;
-    for (std::size_t j = 0; j < r.scene.joints.size(); ++j)
-      joints.emplace(r.scene.joints[j].name, static_cast<int>(j));
-    for (const files::Value& name : names->items()) {
-      const auto found = name.kind() == Kind::text ? joints.find(name.text()) : joints.end();
-      if (found == joints.end()) {
-        coupling.joints.clear();
-        return in.wrong("joints", name.kind() == Kind::text
-                                      ? fmt::format("there is no joint \"{}\"{}", name.text(),
-                                                    r.hint_of(name.text(), joints))
-                                      : std::string("must be ") + kAllowed);
-      }
-      coupling.joints.push_back(found->second);
-    }
   }
 };
 

@@ -36,8 +36,7 @@ Vector3d Coordinate::place(const Bodies& bodies) const { return point<0>(A(bodie
 double Coordinate::rest(const Bodies& bodies) const {
   if (what_ == MotionOf::angle)
     return B(bodies).W.cross(direction(bodies)).dot(A(bodies).W - B(bodies).W);
-  const Jet<double> a = point<2>(A(bodies), at_first_), b = point<2>(B(bodies), at_second_);
-  const Vector3d d = a.x - b.x, d1 = a.x1 - b.x1, d2 = a.x2 - b.x2;
+  const auto [d, d1, d2] = between<2>(A(bodies), at_first_, B(bodies), at_second_);
   if (fixed_direction_) {
     const Jet<double> u = mechanics::direction<2>(B(bodies), axis_);
     return d2.dot(u.x) + 2 * d1.dot(u.x1) + d.dot(u.x2);

@@ -29,9 +29,7 @@ bool is_angle(const Joint& joint) {
 
 int row_count(const Joint& joint) {
   JointRows rows;
-  Frame<double> origin;
-  origin.x = origin.v = origin.W = origin.a = origin.alpha = Vector3d::Zero();
-  origin.R = Matrix3d::Identity();
+  const Frame<double> origin = frame_at(Vector3d::Zero(), Matrix3d::Identity());
   const Now still;
   RowBuilder builder(rows, joint, Row{}, origin, origin, joint.motion ? &still : nullptr);
   type(joint.kind).add_rows(builder);

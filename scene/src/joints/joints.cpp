@@ -1,7 +1,6 @@
 // Tether: joints of a scene as an effect. SPDX-License-Identifier: BSD-3-Clause
 //
 // Their forces are the multipliers of their rows, which the smooth engine solves for.
-
 #include "effects/list.hpp"
 #include "joint_type.hpp"
 #include "mechanics/effect.hpp"
@@ -15,11 +14,11 @@ using joints::JointType;
 namespace {
 
 // False: its kind is not known, and what it would have is passed over.
-bool read_kind(files::Fields& in, Joint& joint) {
+bool read_kind(Fields& in, Joint& joint) {
   if (!in.has("kind")) {
     std::vector<std::string> words;
     for (const auto& [text, kind] : kJointWords) words.emplace_back(text);
-    in.missing("kind", "it is one of " + files::list(words));
+    in.missing("kind", "it is one of " + list(words));
   }
   const std::optional<JointKind> kind = in.word_of<JointKind>("kind");
   if (!kind)
@@ -30,7 +29,7 @@ bool read_kind(files::Fields& in, Joint& joint) {
   return kind.has_value();
 }
 
-bool one_joint(const files::Form& form, Joint& joint) {
+bool one_joint(const Form& form, Joint& joint) {
   form.name("joint", joint.name);
   const bool known = !form.in() || read_kind(*form.in(), joint);
   if (form.out()) form.word("kind", joint.kind);
@@ -39,7 +38,7 @@ bool one_joint(const files::Form& form, Joint& joint) {
   const JointType& type = joints::type(joint.kind);
   type.fields(form, joint);
   if (type.motion() != JointType::MotionOf::nothing)
-    form.table("motion", joint.motion, [&](const files::Form& in, Motion& motion) {
+    form.table("motion", joint.motion, [&](const Form& in, Motion& motion) {
       joints::motion_fields(in, type.motion() == JointType::MotionOf::angle, motion);
     });
   for (const Effect* each : all())
@@ -49,15 +48,14 @@ bool one_joint(const files::Form& form, Joint& joint) {
   return true;
 }
 
-class JointEffect : public Effect {
- public:
-  void fields(const files::Form& root, Scene& scene) const override {
+struct JointEffect : Effect {
+  void fields(const Form& root, Scene& scene) const override {
     root.each("joint", scene.joints, one_joint);
   }
-  void check(const Scene& scene, files::Report& report) const override {
-    files::check_connections(scene, scene.joints, "joint", report);
+  void check(const Scene& scene, Report& report) const override {
+    check_connections(scene, scene.joints, "joint", report);
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     std::string text;
     for (const auto& [name, kind] : Words<JointKind>::list) {
       int count = 0;

@@ -39,13 +39,11 @@ namespace {
 bool is_driven(const Joint& joint) { return joint.motion.has_value(); }
 
 /// Its fields are those of the joint that it drives; its force is a part of the multipliers.
-class PrescribedMotion : public Effect {
- public:
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto count = count_if(scene.joints, is_driven);
-    if (count > 0) lines.push_back({"prescribed motion", counted(count, "joint")});
+struct PrescribedMotion : Effect {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "prescribed motion", count_if(scene.joints, is_driven), "joint");
   }
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     for (const Joint& joint : scene.joints)
       if (joint.motion)
         check_frequency(scene, joint.motion->frequency, joint.place, "joint: motion: frequency",

@@ -40,16 +40,16 @@ struct Coincidence : Row {
 
   template <int order, class S>
   void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
-    const Jet<S> a = point<order>(A, at_first), b = point<order>(B, at_second);
-    for (int i = 0; i < 3; ++i)
-      g[i] = order == 0 ? a.x[i] - b.x[i] : order == 1 ? a.x1[i] - b.x1[i] : a.x2[i] - b.x2[i];
+    const Jet<S> d = between<order>(A, at_first, B, at_second);
+    const Vector3<S>& now = order == 0 ? d.x : order == 1 ? d.x1 : d.x2;
+    for (int i = 0; i < 3; ++i) g[i] = now[i];
   }
   template <class S>
   void pull(const Frame<S>& A, const Frame<S>& B, const double* lambda, Wrench<S>& on_first,
             Wrench<S>& on_second) const {
     const Vector3<S> force = {S(lambda[0]), S(lambda[1]), S(lambda[2])};
-    on_first.add(A, point<0>(A, at_first).x, force);
-    on_second.add(B, point<0>(B, at_second).x, Vector3<S>(-force));
+    add_opposite(A, point<0>(A, at_first).x, B, point<0>(B, at_second).x, force, on_first,
+                 on_second);
   }
   void rate_by_time(double* g_t) const { g_t[0] = g_t[1] = g_t[2] = 0.0; }
 };
@@ -119,11 +119,7 @@ struct Plane : Row {
 
   template <int order, class S>
   void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
-    Jet<S> d = point<order>(A, at_first);
-    const Jet<S> b = point<order>(B, at_second);
-    d.x -= b.x;
-    if constexpr (order >= 1) d.x1 -= b.x1;
-    if constexpr (order >= 2) d.x2 -= b.x2;
+    const Jet<S> d = between<order>(A, at_first, B, at_second);
     g[0] = product<order>(direction<order>(B, normal), d);
     if (now) g[0] -= order == 0 ? now->s : order == 1 ? now->s1 : now->s2;
   }
@@ -134,8 +130,7 @@ struct Plane : Row {
     const Vector3<S> n = times(B.R, normal);
     const Vector3<S> force = {S(n[0] * lambda[0]), S(n[1] * lambda[0]), S(n[2] * lambda[0])};
     const Vector3<S> at = point<0>(A, at_first).x;
-    on_first.add(A, at, force);
-    on_second.add(B, at, Vector3<S>(-force));
+    add_opposite(A, at, B, at, force, on_first, on_second);
   }
   void rate_by_time(double* g_t) const { g_t[0] = now ? -now->s1 : 0.0; }
 };
@@ -150,11 +145,7 @@ struct Distance : Row {
 
   template <int order, class S>
   void rows(const Frame<S>& A, const Frame<S>& B, S* g) const {
-    Jet<S> d = point<order>(A, at_first);
-    const Jet<S> b = point<order>(B, at_second);
-    d.x -= b.x;
-    if constexpr (order >= 1) d.x1 -= b.x1;
-    if constexpr (order >= 2) d.x2 -= b.x2;
+    const Jet<S> d = between<order>(A, at_first, B, at_second);
     const Now n = now ? *now : Now{};
     const double L = length + n.s;
     const double square = order == 0   ? L * L
@@ -171,8 +162,7 @@ struct Distance : Row {
     const double scale = lambda[0] / length;
     Vector3<S> force;
     for (int i = 0; i < 3; ++i) force[i] = (a[i] - b[i]) * scale;
-    on_first.add(A, a, force);
-    on_second.add(B, b, Vector3<S>(-force));
+    add_opposite(A, a, B, b, force, on_first, on_second);
   }
   void rate_by_time(double* g_t) const {
     g_t[0] = now ? -(length + now->s) * now->s1 / length : 0.0;

@@ -1,5 +1,4 @@
-// Tether: the interface of one effect. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: the interface of one effect. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <tether/scene/plan.hpp>
@@ -35,10 +34,20 @@ struct JointLawList {
   }
 };
 
-/// "1 joint", "2 joints".
+/// "1 joint", "2 joints", "2 bodies".
 template <class Integer>
-std::string counted(Integer count, const char* one) {
-  return fmt::format("{} {}{}", count, one, count == 1 ? "" : "s");
+std::string counted(Integer count, std::string_view one) {
+  const bool ends_in_y = one.back() == 'y' && count != 1;
+  return fmt::format("{} {}{}", count, one.substr(0, one.size() - (ends_in_y ? 1 : 0)),
+                     ends_in_y    ? "ies"
+                     : count == 1 ? ""
+                                  : "s");
+}
+/// A line of the plan where there are some: "title: 2 joints" and `more`.
+template <class Integer>
+void add_count(std::vector<PlannedEffect>& lines, const char* title, Integer count,
+               std::string_view one, std::string_view more = "") {
+  if (count > 0) lines.push_back({title, counted(count, one).append(more)});
 }
 
 /// From the centre of a moving body to a point, m.
@@ -117,7 +126,10 @@ class Effect {
 
 namespace tether::scene::effects {
 
+using namespace mechanics;
+using namespace files;
 using mechanics::Effect;
+using Lines = std::vector<PlannedEffect>;
 
 /// Defines <name>_effect(), which the list of effects asks for.
 #define TETHER_EFFECT(name, Kind) \

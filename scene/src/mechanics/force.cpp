@@ -12,25 +12,24 @@ Bodies placed_bodies(const Scene& scene) {
   bodies.frames.resize(count + 1);
   bodies.w.assign(count + 1, Vector3d::Zero());
   for (std::size_t b = 0; b <= count; ++b) {
-    Frame<double>& f = bodies.frames[b];
-    f.x = f.v = f.W = f.a = f.alpha = Vector3d::Zero();
-    f.R = Matrix3d::Identity();
+    bodies.frames[b] = frame_at(Vector3d::Zero(), Matrix3d::Identity());
     if (b == count) continue;  // the world
-    f.x = scene.bodies[b].position;
-    f.R = scene.bodies[b].orientation.normalized().toRotationMatrix();
+    bodies.frames[b].x = scene.bodies[b].position;
+    bodies.frames[b].R = scene.bodies[b].orientation.normalized().toRotationMatrix();
   }
   return bodies;
 }
 
-SteppedBodies::SteppedBodies(const Scene& scene) : bodies_(placed_bodies(scene)) {
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const Body& body = scene.bodies[b];
-    if (body.fixed) continue;
-    bodies_.inertia[b] = {bodies_.moving++, body.mass, body.inertia, body.inertia.inverse()};
-  }
-  loads_.resize(at(bodies_.moving));
-  before_ = bodies_;
+Bodies weighed_bodies(const Scene& scene) {
+  Bodies out = placed_bodies(scene);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (const Body& body = scene.bodies[b]; !body.fixed)
+      out.inertia[b] = {out.moving++, body.mass, body.inertia, body.inertia.inverse()};
+  return out;
 }
+
+SteppedBodies::SteppedBodies(const Scene& scene)
+    : bodies_(weighed_bodies(scene)), before_(bodies_), loads_(at(bodies_.moving)) {}
 
 void SteppedBodies::begin(const contact::BodySet& set, const Vector3d& weight) {
   for (int b = 0; b < set.size(); ++b) {

@@ -50,6 +50,8 @@ struct Load6 {
 /// Frames of all bodies and, last, of the world: positions and attitudes of the scene, at rest; no
 /// inertia, and nothing moves yet.
 Bodies placed_bodies(const Scene& scene);
+/// The same with the inertia of those that move.
+Bodies weighed_bodies(const Scene& scene);
 
 /// The assembly makes the same calls of add() in the same order every time. So it runs once to
 /// record places; afterwards an entry goes to the slot of the same call, in any storage.
@@ -59,12 +61,9 @@ class Entries {
 
   void record() {
     places.clear();
-    recording_ = true;
+    values_ = nullptr;
   }
-  void finish(std::vector<int> slots) {
-    slots_ = std::move(slots);
-    recording_ = false;
-  }
+  void finish(std::vector<int> slots) { slots_ = std::move(slots); }
   const std::vector<int>& slots() const { return slots_; }
   /// `values`: zero on entry.
   void begin(double* values) {
@@ -72,17 +71,16 @@ class Entries {
     next_ = 0;
   }
   void add(int row, int column, double value) {
-    if (recording_)
+    if (values_ == nullptr)
       places.emplace_back(row, column);
     else
       values_[slots_[next_++]] += value;
   }
 
  private:
-  bool recording_ = false;
   std::vector<int> slots_;
   std::size_t next_ = 0;
-  double* values_ = nullptr;
+  double* values_ = nullptr;  // null: it records
 };
 
 /// 3 x 4: the turn in body axes that a change of the quaternion (wxyz) means, for R(q / |q|).
@@ -119,6 +117,12 @@ class JacobianBlocks {
         factor * d.segment<3>(first + 3).transpose() * turns_[static_cast<std::size_t>(slot)];
     for (int k = 0; k < 4; ++k) add(row, column + kQuaternion + k, quaternion[k]);
     for (int k = 0; k < 6; ++k) add(row, column + kVelocity + k, factor * d[first + 6 + k]);
+  }
+  /// The same where `body` moves.
+  void add_body(int row, const Bodies& bodies, int body, const Derivatives& d, int first,
+                double factor) {
+    if (const int slot = bodies.inertia[at(body)].slot; slot >= 0)
+      add_directions(row, slot, d, first, factor);
   }
   /// A 3 x 3 block of derivatives to the turn of a body.
   void add_turn(int row, int slot, const Matrix3d& block) {

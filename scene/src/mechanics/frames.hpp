@@ -139,6 +139,17 @@ Jet<S> point(const Frame<S>& f, const Vector3d& local) {
   return u;
 }
 
+/// The way from a point of B to one of A.
+template <int order, class S>
+Jet<S> between(const Frame<S>& A, const Vector3d& at_a, const Frame<S>& B, const Vector3d& at_b) {
+  Jet<S> d = point<order>(A, at_a);
+  const Jet<S> b = point<order>(B, at_b);
+  d.x -= b.x;
+  if constexpr (order >= 1) d.x1 -= b.x1;
+  if constexpr (order >= 2) d.x2 -= b.x2;
+  return d;
+}
+
 /// The order-th derivative of u . v.
 template <int order, class S>
 S product(const Jet<S>& u, const Jet<S>& v) {
@@ -190,6 +201,15 @@ struct Wrench {
     torque += cross(arm, pull);
   }
 };
+
+/// A force on a point of A, and the opposite on one of B.
+template <class S>
+void add_opposite(const Frame<S>& A, const Vector3<S>& at_a, const Frame<S>& B,
+                  const Vector3<S>& at_b, const Vector3<S>& force, Wrench<S>& on_a,
+                  Wrench<S>& on_b) {
+  on_a.add(A, at_a, force);
+  on_b.add(B, at_b, Vector3<S>(-force));
+}
 
 template <class S>
 Wrench<S> no_wrench() {

@@ -22,9 +22,8 @@ inline void put_wrench(const Bodies& bodies, int first, int second, int body,
   for (int i = 0; i < 6; ++i) {
     const Derivatives& d = (i < 3 ? wrench.force[i] : torque[i - 3]).derivatives();
     const int row = J.motion_row(slot, i);
-    if (bodies.moves(first)) J.add_directions(row, bodies.inertia[at(first)].slot, d, 0, -1.0);
-    if (bodies.moves(second))
-      J.add_directions(row, bodies.inertia[at(second)].slot, d, kBodyDirections, -1.0);
+    J.add_body(row, bodies, first, d, 0, -1.0);
+    J.add_body(row, bodies, second, d, kBodyDirections, -1.0);
   }
 }
 /// Adds the gradient of the potential of the wrench on a body to a row of y.
@@ -79,7 +78,9 @@ class PairForces : public Force {
       put_gradient(bodies, each.second, b, row);
     }
   }
-  bool has_power() const override { return works_; }
+  bool has_power() const override {
+    return any_of(items_, [](const Item& each) { return each.works(); });
+  }
   double power(const Bodies& bodies) const override {
     double sum = 0;
     for (const Item& each : items_)
@@ -92,19 +93,13 @@ class PairForces : public Force {
     for (const Item& each : items_) {
       const auto [A, B] = seed_pair(bodies, each);
       const Dual P = each.works() ? each.template power<Dual>(bodies.time, A, B) : Dual(0.0);
-      if (bodies.moves(each.first))
-        J.add_directions(J.work_row, bodies.inertia[at(each.first)].slot, P.derivatives(), 0, -1.0);
-      if (bodies.moves(each.second))
-        J.add_directions(J.work_row, bodies.inertia[at(each.second)].slot, P.derivatives(),
-                         kBodyDirections, -1.0);
+      J.add_body(J.work_row, bodies, each.first, P.derivatives(), 0, -1.0);
+      J.add_body(J.work_row, bodies, each.second, P.derivatives(), kBodyDirections, -1.0);
     }
   }
 
  protected:
-  void push_back(const Item& item) {
-    works_ = works_ || item.works();
-    items_.push_back(item);
-  }
+  void push_back(Item item) { items_.push_back(std::move(item)); }
   const std::vector<Item>& items() const { return items_; }
 
   template <class S>
@@ -126,7 +121,6 @@ class PairForces : public Force {
             seed(bodies.frames[at(each.second)], bodies.moves(each.second), kBodyDirections)};
   }
   std::vector<Item> items_;
-  bool works_ = false;
 };
 
 }  // namespace tether::scene::mechanics

@@ -6,11 +6,10 @@
 //
 // which is M (u+ - u) = G' x, the law of a plastic impact. Where no row moves (g_t = 0) it takes
 // the energy (u+ - u)' M (u+ - u) / 2 (Carnot).
-#include "closing.hpp"
-
 #include <tether/linalg/least_squares.hpp>
 
 #include "joints/joint_type.hpp"
+#include "switching.hpp"
 
 namespace tether::scene::switching {
 
@@ -27,13 +26,7 @@ struct Placed {
 };
 
 Placed place(const Scene& scene, const std::vector<BodyState>& states) {
-  Placed out{placed_bodies(scene), {}};
-  Bodies& bodies = out.start;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const Body& body = scene.bodies[b];
-    if (body.fixed) continue;
-    bodies.inertia[b] = {bodies.moving++, body.mass, body.inertia, body.inertia.inverse()};
-  }
+  Placed out{weighed_bodies(scene), {}};
   out.now = out.start;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     if (scene.bodies[b].fixed) continue;

@@ -13,7 +13,6 @@
 #include <iterator>
 #include <sstream>
 
-#include "closing.hpp"
 #include "output/binary.hpp"
 #include "switching.hpp"
 

@@ -1,6 +1,7 @@
 // Tether: a TOML document as plain values with their places. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <variant>
 
 #include "report.hpp"
@@ -50,6 +51,28 @@ struct Entry {
   int line = 0, column = 0;
   Value value;
 };
+
+inline bool is_number(const Value& value) {
+  return value.kind() == Value::Kind::number && std::isfinite(value.number());
+}
+/// An array of so many finite numbers.
+inline bool is_numbers(const Value& value, std::size_t count) {
+  return value.kind() == Value::Kind::array && value.items().size() == count &&
+         all_of(value.items(), is_number);
+}
+/// f(the items of each row) of an array of `least` to `most` rows of `width` finite numbers; false:
+/// it is no such array.
+template <class F>
+bool each_row(const Value& value, std::size_t least, std::size_t most, std::size_t width,
+              const F& f) {
+  const Value::Items& rows = value.items();
+  if (value.kind() != Value::Kind::array || rows.size() < least || rows.size() > most) return false;
+  for (const Value& row : rows) {
+    if (!is_numbers(row, width)) return false;
+    f(row.items());
+  }
+  return true;
+}
 
 /// Null where the value is no table, or one without this key.
 Entry* find_entry(Value& table, std::string_view key);

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <filesystem>
 #include <tether/linalg/pi.hpp>
 
@@ -15,6 +14,7 @@ namespace {
 constexpr double kDegree = linalg::kPi / 180;
 // A unit vector may be off by its rounding; beyond it is normalised.
 constexpr double kUnitError = 1e-15;
+constexpr double kAboveZero = std::numeric_limits<double>::denorm_min();
 
 std::string with_unit(std::string_view words, std::string_view unit) {
   return unit.empty() ? std::string(words) : fmt::format("{}, {}", words, unit);
@@ -22,15 +22,13 @@ std::string with_unit(std::string_view words, std::string_view unit) {
 
 }  // namespace
 
-const Range kAny{-kInfinity, kInfinity, false, "a finite number"};
-const Range kPositive{0, kInfinity, true, "a finite number > 0"};
-const Range kNotNegative{0, kInfinity, false, "a finite number >= 0"};
-const Range kPart{0, 1, false, "a number from 0 to 1"};
-const Range kPositivePart{0, 1, true, "a number > 0 and <= 1"};
+const Range kAny{-kInfinity, kInfinity, "a finite number"};
+const Range kPositive{kAboveZero, kInfinity, "a finite number > 0"};
+const Range kNotNegative{0, kInfinity, "a finite number >= 0"};
+const Range kPart{0, 1, "a number from 0 to 1"};
+const Range kPositivePart{kAboveZero, 1, "a number > 0 and <= 1"};
 
-bool Range::holds(double x) const {
-  return std::isfinite(x) && x >= low && x <= high && !(low_excluded && x == low);
-}
+bool Range::holds(double x) const { return std::isfinite(x) && x >= low && x <= high; }
 
 Fields::Fields(const Value* table, std::string path, const std::string& file, Report& report)
     : table_(table), path_(std::move(path)), place_{file, 0, 0}, report_(report) {
@@ -78,33 +76,44 @@ void Fields::missing(std::string_view key, std::string allowed) {
   report_.add(place_, field(key), "", "is missing; " + std::move(allowed));
 }
 
-double Fields::number(std::string_view key, double otherwise, const Range& range,
-                      std::string_view unit) {
+template <class T, class Get, class Allowed>
+T Fields::value(std::string_view key, T otherwise, const Get& get, const Allowed& allowed) {
   const Entry* found = entry(key);
   if (found == nullptr) return otherwise;
-  const Value& value = found->value;
-  if (value.kind() == Value::Kind::number && range.holds(value.number())) return value.number();
-  wrong(*found, value, "must be " + with_unit(range.words, unit));
+  if (std::optional<T> right = get(found->value)) return *std::move(right);
+  wrong(*found, found->value, allowed());
   return otherwise;
+}
+
+double Fields::number(std::string_view key, double otherwise, const Range& range,
+                      std::string_view unit) {
+  return value(
+      key, otherwise,
+      [&](const Value& v) {
+        const bool right = v.kind() == Value::Kind::number && range.holds(v.number());
+        return right ? std::optional(v.number()) : std::nullopt;
+      },
+      [&] { return "must be " + with_unit(range.words, unit); });
 }
 
 int Fields::count(std::string_view key, int otherwise, int low, int high) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return otherwise;
-  const Value& value = found->value;
-  if (value.kind() == Value::Kind::number && value.whole() && value.number() >= low &&
-      value.number() <= high)
-    return static_cast<int>(value.number());
-  wrong(*found, value, fmt::format("must be a whole number from {} to {}", low, high));
-  return otherwise;
+  return value(
+      key, otherwise,
+      [&](const Value& v) {
+        const bool right =
+            v.kind() == Value::Kind::number && v.whole() && v.number() >= low && v.number() <= high;
+        return right ? std::optional(static_cast<int>(v.number())) : std::nullopt;
+      },
+      [&] { return fmt::format("must be a whole number from {} to {}", low, high); });
 }
 
 bool Fields::flag(std::string_view key, bool otherwise) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return otherwise;
-  if (found->value.kind() == Value::Kind::boolean) return found->value.boolean();
-  wrong(*found, found->value, "must be true or false");
-  return otherwise;
+  return value(
+      key, otherwise,
+      [](const Value& v) {
+        return v.kind() == Value::Kind::boolean ? std::optional(v.boolean()) : std::nullopt;
+      },
+      [] { return "must be true or false"; });
 }
 
 std::string Fields::text(std::string_view key, const std::string& otherwise) {
@@ -117,15 +126,14 @@ std::string Fields::name(std::string_view key, const std::string& otherwise) {
 
 std::string Fields::text(std::string_view key, const std::string& otherwise,
                          bool (*is_good)(std::string_view), const char* good) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return otherwise;
-  if (found->value.kind() != Value::Kind::text) {
-    wrong(*found, found->value, "must be a text in quotes");
-    return otherwise;
-  }
-  if (is_good(found->value.text())) return found->value.text();
-  wrong(*found, found->value, good);
-  return otherwise;
+  bool is_text = false;
+  return value(
+      key, otherwise,
+      [&](const Value& v) {
+        is_text = v.kind() == Value::Kind::text;
+        return is_text && is_good(v.text()) ? std::optional(v.text()) : std::nullopt;
+      },
+      [&] { return is_text ? good : "must be a text in quotes"; });
 }
 
 // A scene from an untrusted source must not write elsewhere, nor what other programs look for by
@@ -166,44 +174,34 @@ std::string Fields::inside(std::string_view key, const std::string& file, const 
 
 std::vector<double> Fields::numbers(std::string_view key, const std::vector<std::size_t>& lengths,
                                     std::string_view unit) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return {};
-  const Value& value = found->value;
-  std::vector<double> out;
-  bool right = value.kind() == Value::Kind::array && contains(lengths, value.items().size());
-  if (right)
-    for (const Value& item : value.items()) {
-      right = right && item.kind() == Value::Kind::number && kAny.holds(item.number());
-      out.push_back(item.number());
-    }
-  if (right) return out;
-  wrong(*found, value,
-        "must be " +
-            with_unit(fmt::format("an array of {} finite numbers", fmt::join(lengths, " or ")),
-                      unit));
-  return {};
+  return value(
+      key, std::vector<double>(),
+      [&](const Value& v) -> std::optional<std::vector<double>> {
+        if (!contains(lengths, v.items().size()) || !is_numbers(v, v.items().size())) return {};
+        std::vector<double> out;
+        for (const Value& item : v.items()) out.push_back(item.number());
+        return out;
+      },
+      [&] {
+        const auto words = fmt::format("an array of {} finite numbers", fmt::join(lengths, " or "));
+        return "must be " + with_unit(words, unit);
+      });
 }
 
 Eigen::Vector3d Fields::vector(std::string_view key, const Eigen::Vector3d& otherwise,
                                const Range& range, std::string_view unit) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return otherwise;
   const std::vector<double> x = numbers(key, {3}, unit);
   if (x.empty()) return otherwise;
-  for (const double each : x)
-    if (!range.holds(each)) {
-      wrong(*found, found->value, "each must be " + with_unit(range.words, unit));
-      return otherwise;
-    }
-  return {x[0], x[1], x[2]};
+  if (all_of(x, [&](double each) { return range.holds(each); })) return {x[0], x[1], x[2]};
+  wrong(key, "each must be " + with_unit(range.words, unit));
+  return otherwise;
 }
 
 Eigen::Vector3d Fields::direction(std::string_view key, const Eigen::Vector3d& otherwise) {
-  const Entry* found = entry(key);
   const Eigen::Vector3d v = vector(key, otherwise, kAny, "");
   const double length = v.stableNorm();
   if (!(length > 0) || !std::isfinite(length)) {
-    if (found != nullptr) wrong(*found, found->value, "must not be zero: it is a direction");
+    if (has(key)) wrong(key, "must not be zero: it is a direction");
     return otherwise;
   }
   // A normalised value is kept, so that a scene written and read again is the same.
@@ -214,41 +212,29 @@ Eigen::Vector3d Fields::direction(std::string_view key, const Eigen::Vector3d& o
 
 std::vector<Eigen::Vector3d> Fields::points(std::string_view key, std::size_t least,
                                             std::size_t most) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return {};
-  const Value& value = found->value;
-  bool right = value.kind() == Value::Kind::array && value.items().size() >= least &&
-               value.items().size() <= most;
-  std::vector<Eigen::Vector3d> out;
-  if (right)
-    for (const Value& item : value.items()) {
-      right = right && item.kind() == Value::Kind::array && item.items().size() == 3;
-      if (!right) break;
-      Eigen::Vector3d p;
-      for (int i = 0; i < 3; ++i) {
-        const Value& x = item.items()[static_cast<std::size_t>(i)];
-        right = right && x.kind() == Value::Kind::number && kAny.holds(x.number());
-        p[i] = x.number();
-      }
-      out.push_back(p);
-    }
-  if (right) return out;
-  const std::string number =
-      least == most ? fmt::format("{}", least) : fmt::format("{} to {}", least, most);
-  wrong(*found, value, fmt::format("must be an array of {} points [x, y, z], m", number));
-  return {};
+  return value(
+      key, std::vector<Eigen::Vector3d>(),
+      [&](const Value& v) {
+        std::optional<std::vector<Eigen::Vector3d>> out(std::in_place);
+        if (!each_row(v, least, most, 3, [&](const Value::Items& p) {
+              out->emplace_back(p[0].number(), p[1].number(), p[2].number());
+            }))
+          out.reset();
+        return out;
+      },
+      [&] {
+        return fmt::format("must be an array of {}{} points [x, y, z], m", least,
+                           least == most ? "" : fmt::format(" to {}", most));
+      });
 }
 
 std::vector<std::array<double, 2>> Fields::pairs(std::string_view key, std::size_t most) {
-  const Value* value = find(key);
-  if (value == nullptr || value->items().size() > most) return {};
   std::vector<std::array<double, 2>> out;
-  for (const Value& row : value->items()) {
-    if (row.items().size() != 2) return {};
-    for (const Value& x : row.items())
-      if (x.kind() != Value::Kind::number || !kAny.holds(x.number())) return {};
-    out.push_back({row.items()[0].number(), row.items()[1].number()});
-  }
+  const Value* value = find(key);
+  if (value == nullptr || !each_row(*value, 1, most, 2, [&](const Value::Items& row) {
+        out.push_back({row[0].number(), row[1].number()});
+      }))
+    out.clear();
   return out;
 }
 
@@ -266,42 +252,42 @@ double Fields::angle(const std::string& stem, double otherwise, std::string_view
 }
 
 int Fields::choice(std::string_view key, const std::vector<std::string>& words) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return -1;
-  const Value& value = found->value;
-  if (value.kind() == Value::Kind::text) {
-    const auto at = std::find(words.begin(), words.end(), value.text());
-    if (at != words.end()) return static_cast<int>(at - words.begin());
-  }
-  const std::string near = value.kind() == Value::Kind::text ? nearest(value.text(), words) : "";
-  wrong(*found, value,
-        "must be one of " + list(words) +
-            (near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
-  return -1;
+  std::string near;
+  return value(
+      key, -1,
+      [&](const Value& v) -> std::optional<int> {
+        if (v.kind() != Value::Kind::text) return {};
+        const auto at = std::find(words.begin(), words.end(), v.text());
+        if (at != words.end()) return static_cast<int>(at - words.begin());
+        near = nearest(v.text(), words);
+        return {};
+      },
+      [&] {
+        return "must be one of " + list(words) +
+               (near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near));
+      });
 }
 
 const Value* Fields::table(std::string_view key) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return nullptr;
-  if (found->value.kind() == Value::Kind::table) return &found->value;
-  wrong(*found, found->value, fmt::format("must be a table: [{}]", key));
-  return nullptr;
+  return value<const Value*>(
+      key, nullptr,
+      [](const Value& v) {
+        return v.kind() == Value::Kind::table ? std::optional(&v) : std::nullopt;
+      },
+      [&] { return fmt::format("must be a table: [{}]", key); });
 }
 
 std::vector<const Value*> Fields::tables(std::string_view key) {
   const Entry* found = entry(key);
-  if (found == nullptr) return {};
   std::vector<const Value*> out;
-  if (found->value.kind() != Value::Kind::array) {
+  if (found == nullptr) return out;
+  if (found->value.kind() != Value::Kind::array)
     wrong(*found, found->value, fmt::format("must be an array of tables: [[{}]]", key));
-    return {};
-  }
-  for (const Value& item : found->value.items()) {
+  for (const Value& item : found->value.items())
     if (item.kind() == Value::Kind::table)
       out.push_back(&item);
     else
       wrong(*found, item, fmt::format("must be a table: [[{}]]", key));
-  }
   return out;
 }
 
@@ -314,67 +300,22 @@ void Fields::finish() {
   }
 }
 
-using Eigen::Vector3d;
-
-int Reader::body(Fields& in, std::string_view key) const {
-  if (!in.has(key)) {
-    in.missing(key, "the name of a body");
-    return 0;
-  }
+int Reader::named(Fields& in, std::string_view key, const std::string& kind,
+                  const std::map<std::string, int>& all) const {
+  if (!in.has(key)) return in.missing(key, "the name of a " + kind), 0;
   const std::string name = in.name(key, "");
-  const auto found = bodies.find(name);
-  if (found != bodies.end()) return found->second;
-  in.wrong(key, "no such body" + hint_of(name, scene.bodies));
+  if (const auto found = all.find(name); found != all.end()) return found->second;
+  in.wrong(key, "no such " + kind + hint_of(name, all));
   return 0;
 }
 
 std::vector<int> Reader::several_bodies(Fields& in, std::size_t least, std::size_t most,
                                         const char* allowed) const {
-  const Value* value = in.find("bodies");
-  if (value == nullptr) {
-    in.missing("bodies", allowed);
-    return {};
-  }
-  const auto wrong = [&](std::string why) {
-    in.wrong("bodies", std::move(why));
-    return std::vector<int>{};
-  };
-  if (value->kind() != Value::Kind::array || value->items().size() < least ||
-      value->items().size() > most)
-    return wrong(std::string("must be ") + allowed);
   std::vector<int> out;
-  for (const Value& name : value->items()) {
-    if (name.kind() != Value::Kind::text) return wrong(std::string("must be ") + allowed);
-    const auto found = bodies.find(name.text());
-    if (name.text() != "world" && found == bodies.end())
-      return wrong(fmt::format("there is no body \"{}\"{}", name.text(),
-                               hint_of(name.text(), scene.bodies)));
-    out.push_back(name.text() == "world" ? -1 : found->second);
-  }
+  for (const std::string& name :
+       names(in, "bodies", least, most, allowed, "there is no body", bodies, "world"))
+    out.push_back(name == "world" ? -1 : bodies.at(name));
   return out;
-}
-
-void Reader::two_bodies(Fields& in, int& first, int& second) const {
-  const std::vector<int> both =
-      several_bodies(in, 2, 2, "two names of bodies; \"world\" is the ground");
-  if (both.empty()) return;
-  first = both[0];
-  second = both[1];
-  if (first == second) in.wrong("bodies", "must be two different bodies");
-}
-
-std::string read_name(Fields& in, const std::string& kind) {
-  const std::string name = in.name("name", in.path());
-  if (in.has("name")) in.rename(fmt::format("{} \"{}\"", kind, name));
-  return name;
-}
-
-void read_two_points(Fields& in, Vector3d& first, Vector3d& second) {
-  if (!in.has("at")) in.missing("at", "the two points [[x, y, z], [x, y, z]], world, m");
-  const std::vector<Vector3d> points = in.points("at", 2, 2);
-  if (points.empty()) return;
-  first = points[0];
-  second = points[1];
 }
 
 }  // namespace tether::scene::files

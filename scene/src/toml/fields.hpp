@@ -8,15 +8,12 @@
 #include <tether/scene/words.hpp>
 
 #include "document.hpp"
-#include "fields.hpp"
-#include "report.hpp"
 
 namespace tether::scene::files {
 
-/// The allowed values of a number: finite, and between the bounds.
+/// The allowed values of a number: finite, and from `low` to `high`.
 struct Range {
   double low, high;
-  bool low_excluded;
   std::string_view words;      ///< e.g. "a number > 0"
   bool holds(double x) const;  ///< false for nan and inf
 };
@@ -93,6 +90,9 @@ class Fields {
   std::string field(std::string_view key) const;
 
  private:
+  /// get(the value): what it is, nothing where it is not right; allowed(): what would be.
+  template <class T, class Get, class Allowed>
+  T value(std::string_view key, T otherwise, const Get& get, const Allowed& allowed);
   std::string text(std::string_view key, const std::string& otherwise,
                    bool (*is_good)(std::string_view), const char* good);
   std::string inside(std::string_view key, const std::string& file, const char* whose);
@@ -134,30 +134,57 @@ struct Reader {
     }
   }
 
-  /// `; did you mean ...?`; nothing for problems beyond those shown: each hint compares all names.
-  template <class Names>
-  std::string hint_of(const std::string& wrong, const Names& names) const {
-    if (report.full()) return "";
-    std::vector<std::string> all;
-    for (const auto& each : names) all.push_back(name_of(each));
-    return hint(wrong, all);
+  /// The element of [[kind]] that `key` names, by its number in `all`; 0 where it is wrong.
+  int named(Fields& in, std::string_view key, const std::string& kind,
+            const std::map<std::string, int>& all) const;
+  /// An array of `least` to `most` names of `known` ones, or of `besides`; empty where it is wrong:
+  /// `unknown` says what a name is that is not known.
+  template <class Known>
+  std::vector<std::string> names(Fields& in, std::string_view key, std::size_t least,
+                                 std::size_t most, const char* allowed, const char* unknown,
+                                 const Known& known, std::string_view besides = {}) const {
+    const Value* value = in.find(key);
+    std::vector<std::string> out;
+    if (value == nullptr) return in.missing(key, allowed), out;
+    bool right = value->kind() == Value::Kind::array && value->items().size() >= least &&
+                 value->items().size() <= most;
+    for (std::size_t k = 0; right && k < value->items().size(); ++k) {
+      const std::string& name = out.emplace_back(value->items()[k].text());
+      right = value->items()[k].kind() == Value::Kind::text;
+      if (!right || name == besides || known.count(name) > 0) continue;
+      in.wrong(key, fmt::format("{} \"{}\"{}", unknown, name, hint_of(name, known)));
+      return {};
+    }
+    if (right) return out;
+    in.wrong(key, std::string("must be ") + allowed);
+    return {};
   }
-
-  /// The body that `key` names.
-  int body(Fields& in, std::string_view key) const;
   /// bodies = ["a", "world", ...], `least` to `most`, -1 being the world; empty where it is wrong.
   std::vector<int> several_bodies(Fields& in, std::size_t least, std::size_t most,
                                   const char* allowed) const;
-  /// bodies = ["a", "world"]
-  void two_bodies(Fields& in, int& first, int& second) const;
 
  private:
+  /// `; did you mean ...?`; nothing for problems beyond those shown: each hint compares all names.
+  template <class Known>
+  std::string hint_of(const std::string& wrong, const Known& known) const {
+    if (report.full()) return "";
+    std::vector<std::string> all;
+    for (const auto& each : known) all.push_back(name_of(each));
+    return hint(wrong, all);
+  }
   static const std::string& name_of(const std::string& name) { return name; }
   static const std::string& name_of(const std::pair<const std::string, int>& each) {
     return each.first;
   }
-  static const std::string& name_of(const Body& body) { return body.name; }
 };
+
+/// By name; the first of several.
+template <class Named>
+std::map<std::string, int> index_of(const std::vector<Named>& all) {
+  std::map<std::string, int> out;
+  for (const Named& each : all) out.emplace(each.name, static_cast<int>(&each - all.data()));
+  return out;
+}
 
 /// All that is left of it, a block more than `most` bytes at most. By blocks: reading a folder, or
 /// a file that is truncated meanwhile, fails without a throw.
@@ -182,12 +209,13 @@ inline std::vector<std::string> split(const std::string& text, char at) {
   return out;
 }
 
-/// The field `name` of an element of [[kind]], which names it in messages from here on.
-std::string read_name(Fields& in, const std::string& kind);
-
-/// at = [[x, y, z], [x, y, z]]: on the first and on the second body; reported and left alone
-/// where it is missing or wrong.
-void read_two_points(Fields& in, Eigen::Vector3d& first, Eigen::Vector3d& second);
+/// Reports a name of [[kind]] that `names` has; else it has it from here on.
+template <class Named>
+void check_name(const Named& each, const char* kind, std::set<std::string>& names, Report& report) {
+  if (!names.insert(each.name).second)
+    report.add(each.place, fmt::format("{} \"{}\": name", kind, each.name), "",
+               "another one has it already");
+}
 
 /// Names of elements of [[kind]] that stand twice, and those of which no body can move.
 template <class Connection>
@@ -195,11 +223,10 @@ void check_connections(const Scene& scene, const std::vector<Connection>& all, c
                        Report& report) {
   std::set<std::string> names;
   for (const Connection& each : all) {
-    const std::string path = fmt::format("{} \"{}\"", kind, each.name);
-    if (!names.insert(each.name).second)
-      report.add(each.place, path + ": name", "", "another one has it already");
+    check_name(each, kind, names, report);
     if (!scene.moves(each.first) && !scene.moves(each.second))
-      report.add(each.place, path + ": bodies", "", "one of them must be able to move");
+      report.add(each.place, fmt::format("{} \"{}\": bodies", kind, each.name), "",
+                 "one of them must be able to move");
   }
 }
 

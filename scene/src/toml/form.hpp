@@ -11,16 +11,27 @@ namespace tether::scene::files {
 
 /// Read again, each gives the same bits.
 std::string toml(double x);
-std::string toml(const std::vector<double>& numbers);
 std::string toml(bool x);
 std::string toml(int x);
-std::string toml(const Eigen::Vector3d& v);
 std::string toml(std::string_view text);
-std::string toml(const std::string& text);
+inline std::string toml(const std::string& text) { return toml(std::string_view(text)); }
+inline std::string in_brackets(const std::vector<std::string>& items) {
+  return "[" + list(items) + "]";
+}
+template <class T, std::size_t n>
+std::string toml(const std::array<T, n>& row) {
+  std::vector<std::string> items;
+  for (const T& each : row) items.push_back(toml(each));
+  return in_brackets(items);
+}
+inline std::string toml(const Eigen::Vector3d& v) { return toml(std::array{v.x(), v.y(), v.z()}); }
 std::string toml(const Eigen::Quaterniond& q);
-std::string toml(const std::vector<Eigen::Vector3d>& points);
-std::string toml(const std::vector<std::array<int, 3>>& triangles);
-std::string toml(const std::vector<std::array<double, 2>>& rows);
+template <class T>
+std::string toml(const std::vector<T>& all) {
+  std::vector<std::string> items;
+  for (const T& each : all) items.push_back(toml(each));
+  return in_brackets(items);
+}
 template <class E>
 std::string toml_word(E value) {
   return toml(word(value));
@@ -101,6 +112,10 @@ class Form {
     if (in_) v = in_->direction(key, v);
     put(key, v, {});
   }
+  void direction(std::string_view key, std::optional<Eigen::Vector3d>& v) const {
+    if (in_ && in_->has(key)) v = Eigen::Vector3d::UnitX();
+    if (v) direction(key, *v);
+  }
   void flag(std::string_view key, bool& x) const {
     if (in_) x = in_->flag(key, x);
     if (out_) out_->field(key, x);
@@ -116,20 +131,30 @@ class Form {
   }
   /// The name of an element of [[kind]], by which messages call it from here on.
   void name(const char* kind, std::string& name) const {
-    if (in_) name = read_name(*in_, kind);
+    if (in_) name = in_->name("name", in_->path());
+    if (in_ && in_->has("name")) in_->rename(fmt::format("{} \"{}\"", kind, name));
     if (out_) out_->field("name", name);
   }
   void body(std::string_view key, int& body) const {
-    if (in_) body = reader_->body(*in_, key);
+    if (in_) body = reader_->named(*in_, key, "body", reader_->bodies);
     if (out_) out_->field(key, scene_->bodies[linalg::at(body)].name);
   }
   void bodies(int& first, int& second) const {
-    if (in_) reader_->two_bodies(*in_, first, second);
     if (out_) out_->raw("bodies", names(*scene_, {first, second}));
+    if (!in_) return;
+    const std::vector<int> both =
+        reader_->several_bodies(*in_, 2, 2, "two names of bodies; \"world\" is the ground");
+    if (both.empty()) return;
+    first = both[0];
+    second = both[1];
+    if (first == second) in_->wrong("bodies", "must be two different bodies");
   }
   /// At = [[x, y, z], [x, y, z]]: on the first and on the second body.
   void points(Eigen::Vector3d& first, Eigen::Vector3d& second) const {
-    if (in_) read_two_points(*in_, first, second);
+    require("at", "the two points [[x, y, z], [x, y, z]], world, m");
+    const std::vector<Eigen::Vector3d> read =
+        in_ ? in_->points("at", 2, 2) : std::vector<Eigen::Vector3d>();
+    if (!read.empty()) first = read[0], second = read[1];
     if (out_) out_->raw("at", toml(std::vector<Eigen::Vector3d>{first, second}), "m");
     if (units_) first /= units_->length, second /= units_->length;
   }

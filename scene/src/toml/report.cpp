@@ -1,5 +1,6 @@
 // Tether: what is wrong in a scene file. SPDX-License-Identifier: BSD-3-Clause
 #include "report.hpp"
+#include "bounds.hpp"
 
 #include <fmt/format.h>
 
@@ -11,10 +12,7 @@ namespace {
 
 std::string all_messages(const std::vector<Problem>& problems) {
   std::string text;
-  for (const Problem& problem : problems) {
-    if (!text.empty()) text += '\n';
-    text += problem.message();
-  }
+  for (const Problem& problem : problems) text += (text.empty() ? "" : "\n") + problem.message();
   return text;
 }
 
@@ -34,13 +32,6 @@ SceneError::SceneError(std::vector<Problem> problems)
     : std::runtime_error(all_messages(problems)), problems_(std::move(problems)) {}
 
 namespace files {
-
-void refuse(const Place& place, std::string why) {
-  std::vector<Problem> one(1);
-  one.front().place = place;
-  one.front().allowed = std::move(why);
-  throw SceneError(std::move(one));
-}
 
 namespace {
 
@@ -65,12 +56,12 @@ bool is_prefix(std::string_view a, std::string_view b) { return b.substr(0, a.si
 }  // namespace
 
 std::string nearest(std::string_view text, const std::vector<std::string>& candidates) {
-  constexpr std::size_t kLongest = 64;  // longer keys get no suggestion; bounds the work
-  if (text.empty() || text.size() > kLongest) return "";
+  // Longer keys get no suggestion, which bounds the work.
+  if (text.empty() || text.size() > kLongestShown) return "";
   std::string best;
   std::size_t least = 1 + std::max<std::size_t>(1, text.size() / 2);
   for (const std::string& candidate : candidates) {
-    if (candidate.size() > kLongest) continue;
+    if (candidate.size() > kLongestShown) continue;
     const bool shortened = text.size() > 1 && is_prefix(text, candidate);  // pos, vel
     const std::size_t away = shortened ? 0 : distance(text, candidate);
     if (away < least) {
@@ -88,9 +79,7 @@ std::string list(const std::vector<std::string>& words) {
 std::string hint(std::string_view text, const std::vector<std::string>& candidates) {
   const std::string near = nearest(text, candidates);
   if (!near.empty()) return fmt::format("; did you mean \"{}\"?", near);
-  if (candidates.empty()) return "";
-  constexpr std::size_t kMost = 30;
-  if (candidates.size() > kMost) return "";
+  if (candidates.empty() || candidates.size() > kMostSuggested) return "";
   return "; known: " + list(candidates);
 }
 

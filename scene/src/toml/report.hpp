@@ -55,7 +55,9 @@ constexpr const char* kName =
     "in other widths, not begin with = + - @ or a blank, and have at most 1000 bytes";
 
 /// Throws a SceneError of one problem.
-[[noreturn]] void refuse(const Place& place, std::string why);
+[[noreturn]] inline void refuse(const Place& place, std::string why) {
+  throw SceneError(std::vector<Problem>{{place, "", "", std::move(why)}});
+}
 
 /// The candidate that `text` is probably a misspelling of; empty: none is near.
 std::string nearest(std::string_view text, const std::vector<std::string>& candidates);

@@ -2,11 +2,10 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
 using Eigen::Vector3d;
 
-class BoxType final : public ShapeType {
+struct BoxType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"size", &Shape::size, "the full edges [x, y, z], m, > 0", "m (full edges)"}};
   }
@@ -30,8 +29,6 @@ class BoxType final : public ShapeType {
     return std::exchange(s.size, Vector3d::Ones());
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(box, BoxType)
 

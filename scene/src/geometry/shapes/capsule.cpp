@@ -2,11 +2,10 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
 using Eigen::Vector3d;
 
-class CapsuleType final : public ShapeType {
+struct CapsuleType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"radius", &Shape::radius, "m, > 0"},
             {"length", &Shape::length, "between the centres of the caps, m, > 0"}};
@@ -32,8 +31,6 @@ class CapsuleType final : public ShapeType {
   }
   bool is_round() const override { return true; }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(capsule, CapsuleType)
 

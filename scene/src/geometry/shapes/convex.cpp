@@ -4,11 +4,8 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
-using Eigen::Vector3d;
-
-class ConvexType final : public ShapeType {
+struct ConvexType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"points", &Shape::points, "its corners [[x, y, z], ...], m", "", 4}};
   }
@@ -21,8 +18,6 @@ class ConvexType final : public ShapeType {
     return true;
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(convex, ConvexType)
 

@@ -2,11 +2,10 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
 using Eigen::Vector3d;
 
-class CylinderType final : public ShapeType {
+struct CylinderType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"radius", &Shape::radius, "m, > 0"},
             {"length", &Shape::length, "of the whole cylinder, m, > 0"}};
@@ -45,8 +44,6 @@ class CylinderType final : public ShapeType {
     return true;
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(cylinder, CylinderType)
 

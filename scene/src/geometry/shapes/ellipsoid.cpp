@@ -2,11 +2,10 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
 using Eigen::Vector3d;
 
-class EllipsoidType final : public ShapeType {
+struct EllipsoidType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"half_axes", &Shape::size, "[x, y, z], m, > 0"}};
   }
@@ -27,8 +26,6 @@ class EllipsoidType final : public ShapeType {
   }
   bool is_round() const override { return true; }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(ellipsoid, EllipsoidType)
 

@@ -1,13 +1,9 @@
 // Tether: surfaces of scenes. SPDX-License-Identifier: BSD-3-Clause
-#include "geometry/read_surface.hpp"
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
-using Eigen::Vector3d;
-
-class MeshType final : public ShapeType {
+struct MeshType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"points", &Shape::points, ""}, {"triangles", &Shape::triangles, ""}};
   }
@@ -25,8 +21,6 @@ class MeshType final : public ShapeType {
     return m;
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(mesh, MeshType)
 

@@ -2,11 +2,10 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
 using Eigen::Vector3d;
 
-class PlaneType final : public ShapeType {
+struct PlaneType : ShapeType {
   std::vector<ShapeField> fields() const override { return {{"normal", &Shape::normal, nullptr}}; }
   Mesh polygons(const Shape& s, int, double half) const override {
     const Vector3d other = std::abs(s.normal.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
@@ -18,8 +17,6 @@ class PlaneType final : public ShapeType {
     return true;
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(plane, PlaneType)
 

@@ -2,11 +2,8 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
-using Eigen::Vector3d;
-
-class PointsType final : public ShapeType {
+struct PointsType : ShapeType {
   std::vector<ShapeField> fields() const override {
     return {{"points", &Shape::points, "the points that touch [[x, y, z], ...], m", "", 1}};
   }
@@ -16,8 +13,6 @@ class PointsType final : public ShapeType {
     return true;
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(points, PointsType)
 

@@ -2,11 +2,10 @@
 #include "geometry/shape_type.hpp"
 
 namespace tether::scene {
-namespace {
 
 using Eigen::Vector3d;
 
-class SphereType final : public ShapeType {
+struct SphereType : ShapeType {
   std::vector<ShapeField> fields() const override { return {{"radius", &Shape::radius, "m, > 0"}}; }
   MassProperties solid(const Shape& s) const override {
     const double r = s.radius, volume = 4.0 / 3.0 * linalg::kPi * r * r * r;
@@ -25,8 +24,6 @@ class SphereType final : public ShapeType {
     return Vector3d::Constant(size);
   }
 };
-
-}  // namespace
 
 TETHER_SHAPE_TYPE(sphere, SphereType)
 

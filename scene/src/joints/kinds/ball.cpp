@@ -5,10 +5,7 @@
 
 namespace tether::scene::joints {
 
-namespace {
-
-class Ball : public JointType {
- public:
+struct Ball : JointType {
   JointKind kind() const override { return JointKind::ball; }
   bool turns_freely() const override { return true; }
   void add_rows(RowBuilder& rows) const override { rows.coincide(); }
@@ -17,8 +14,6 @@ class Ball : public JointType {
     momenta.force_through(joint.at, kOrigin, because);
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(ball, Ball)
 

@@ -1,15 +1,11 @@
 // Tether: the distance joint. SPDX-License-Identifier: BSD-3-Clause
 //
 // Two points at a distance, which a motion changes; 1 row.
-
 #include "joints/joint_type.hpp"
 
 namespace tether::scene::joints {
 
-namespace {
-
-class DistanceJoint : public JointType {
- public:
+struct DistanceJoint : JointType {
   JointKind kind() const override { return JointKind::distance; }
   MotionOf motion() const override { return MotionOf::length; }
   void fields(const files::Form& form, Joint& joint) const override {
@@ -42,8 +38,6 @@ class DistanceJoint : public JointType {
     return joint.length ? *joint.length : (joint.at_second - joint.at).norm();
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(distance, DistanceJoint)
 

@@ -5,18 +5,13 @@
 
 namespace tether::scene::joints {
 
-namespace {
-
-class Fixed : public JointType {
- public:
+struct Fixed : JointType {
   JointKind kind() const override { return JointKind::fixed; }
   void add_rows(RowBuilder& rows) const override {
     rows.coincide();
     rows.same_attitude();
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(fixed, Fixed)
 

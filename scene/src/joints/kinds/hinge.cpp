@@ -5,10 +5,7 @@
 
 namespace tether::scene::joints {
 
-namespace {
-
-class Hinge : public AxisJoint {
- public:
+struct Hinge : AxisJoint {
   JointKind kind() const override { return JointKind::hinge; }
   MotionOf motion() const override { return MotionOf::angle; }
   bool is_free() const override { return true; }
@@ -26,8 +23,6 @@ class Hinge : public AxisJoint {
       momenta.axes.none(because);
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(hinge, Hinge)
 

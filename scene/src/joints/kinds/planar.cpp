@@ -5,10 +5,7 @@
 
 namespace tether::scene::joints {
 
-namespace {
-
-class Planar : public AxisJoint {
- public:
+struct Planar : AxisJoint {
   JointKind kind() const override { return JointKind::planar; }
   void add_rows(RowBuilder& rows) const override {
     rows.right_angle(rows.x(), rows.z());
@@ -16,8 +13,6 @@ class Planar : public AxisJoint {
     rows.plane(rows.z(), nullptr);
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(planar, Planar)
 

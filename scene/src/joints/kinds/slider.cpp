@@ -5,10 +5,7 @@
 
 namespace tether::scene::joints {
 
-namespace {
-
-class Slider : public AxisJoint {
- public:
+struct Slider : AxisJoint {
   JointKind kind() const override { return JointKind::slider; }
   MotionOf motion() const override { return MotionOf::length; }
   bool is_free() const override { return true; }
@@ -23,8 +20,6 @@ class Slider : public AxisJoint {
     if (rows.now()) rows.plane(rows.z(), rows.now());
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(slider, Slider)
 

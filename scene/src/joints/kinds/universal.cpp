@@ -2,15 +2,11 @@
 //
 // A cross joins the bodies: they have its centre in common, and its arms, one fixed in each body,
 // stay at right angles; 4 rows.
-
 #include "joints/joint_type.hpp"
 
 namespace tether::scene::joints {
 
-namespace {
-
-class Universal : public JointType {
- public:
+struct Universal : JointType {
   JointKind kind() const override { return JointKind::universal; }
   void fields(const files::Form& form, Joint& joint) const override {
     point(form, joint);
@@ -47,8 +43,6 @@ class Universal : public JointType {
     return std::abs(u.normalized().dot(v.normalized())) < 1e-6;
   }
 };
-
-}  // namespace
 
 TETHER_JOINT(universal, Universal)
 

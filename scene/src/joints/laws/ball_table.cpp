@@ -5,13 +5,10 @@
 // start with the turn of their end.
 #include "bounds.hpp"
 #include "joints/coordinate.hpp"
-#include "joints/joint_type.hpp"
-#include "joints/laws/force_table.hpp"
+#include "joints/laws/joint_law_effect.hpp"
 #include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
-
-using namespace mechanics;
 
 namespace {
 
@@ -76,8 +73,7 @@ struct BallTable {
   }
 };
 
-class BallTables : public PairForces<BallTable> {
- public:
+struct BallTables : PairForces<BallTable> {
   BallTables(const Scene& scene, const Bodies& bodies) {
     for (std::size_t j = 0; j < scene.joints.size(); ++j) {
       if (!has_table(scene.joints[j])) continue;
@@ -97,14 +93,12 @@ class BallTables : public PairForces<BallTable> {
   }
 };
 
-class BallTableEffect : public Effect {
- public:
+struct BallTableEffect : Effect {
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
     return any_of(scene.joints, has_table) ? std::make_unique<BallTables>(scene, bodies) : nullptr;
   }
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    if (const auto count = count_if(scene.joints, has_table); count > 0)
-      lines.push_back({"tables of balls", counted(count, "joint")});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "tables of balls", count_if(scene.joints, has_table), "joint");
   }
   void limit_momenta(Momenta& momenta) const override {
     for (const Joint& each : momenta.scene.joints)

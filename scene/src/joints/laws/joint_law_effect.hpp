@@ -6,24 +6,38 @@
 
 namespace tether::scene::effects {
 
-class JointLawEffect : public Effect {
- public:
-  void plan(const Scene& scene, EngineKind,
-            std::vector<mechanics::PlannedEffect>& lines) const override {
-    const auto count = count_if(scene.joints, has_);
-    if (count > 0) lines.push_back({title_, mechanics::counted(count, "joint")});
+/// Rows of a stretch or speed and its force, which begin behind a row of zeros and are joined by
+/// straight pieces; behind the last one the force stays.
+using ForceTable = std::vector<std::array<double, 2>>;
+
+inline double slope(const std::array<double, 2>& from, const std::array<double, 2>& to) {
+  return (to[1] - from[1]) / (to[0] - from[0]);
+}
+
+/// f(from, to): the rows at the ends of each piece.
+template <class F>
+void each_piece(const ForceTable& table, const F& f) {
+  std::array<double, 2> from{0, 0};
+  for (const std::array<double, 2>& to : table) {
+    f(from, to);
+    from = to;
+  }
+}
+
+struct JointLawEffect : Effect {
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, title_, count_if(scene.joints, has_), "joint");
   }
   bool has_joint_laws(const Scene& scene) const override { return any_of(scene.joints, has_); }
 
  protected:
   JointLawEffect(const char* title, bool (*has)(const Joint&)) : title_(title), has_(has) {}
 
-  static void stiffness(const files::Form& form, bool angle, double& x) {
-    form.number("stiffness", x, files::kNotNegative,
-                angle ? Unit{"N m/rad", 1, 2, -2} : kStiffness);
+  static void stiffness(const Form& form, bool angle, double& x) {
+    form.number("stiffness", x, kNotNegative, angle ? Unit{"N m/rad", 1, 2, -2} : kStiffness);
   }
-  static void damping(const files::Form& form, bool angle, double& x) {
-    form.number("damping", x, files::kNotNegative, angle ? Unit{"N m s/rad", 1, 2, -1} : kDamping);
+  static void damping(const Form& form, bool angle, double& x) {
+    form.number("damping", x, kNotNegative, angle ? Unit{"N m s/rad", 1, 2, -1} : kDamping);
   }
 
  private:

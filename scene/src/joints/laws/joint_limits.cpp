@@ -8,13 +8,11 @@
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
-
 namespace {
 
 bool has_limits(const Joint& joint) { return joint.limits.has_value(); }
 
-void read_limits(files::Fields& in, bool angle, Joint& joint) {
+void read_limits(Fields& in, bool angle, Joint& joint) {
   const bool degrees = angle && in.has("limits_deg");
   const char* const key = degrees ? "limits_deg" : angle ? "limits_rad" : "limits";
   if (degrees && in.has("limits_rad"))
@@ -30,23 +28,22 @@ void read_limits(files::Fields& in, bool angle, Joint& joint) {
   JointLimits& limits = joint.limits.emplace();
   limits.lower = unit * list[0];
   limits.upper = unit * list[1];
-  limits.restitution = in.number("limit_restitution", 0, files::kPart, "");
+  limits.restitution = in.number("limit_restitution", 0, kPart, "");
   if (!(limits.lower <= 0 && limits.upper >= 0 && limits.lower < limits.upper))
     in.wrong(key, "must be [least, largest] with 0, where the joint starts, between them");
   if (angle && !(limits.upper - limits.lower < 2 * linalg::kPi))
     in.wrong(key, "must be less than a full turn apart");
 }
 
-class JointLimitEffect : public JointLawEffect {
- public:
+struct JointLimitEffect : JointLawEffect {
   JointLimitEffect() : JointLawEffect("joint limits", has_limits) {}
-  void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
+  void joint_fields(const Form& form, bool angle, Joint& joint) const override {
     if (form.in()) return read_limits(*form.in(), angle, joint);
     if (!joint.limits) return;
     if (form.out())
       form.out()->field(angle ? "limits_rad" : "limits",
                         std::vector<double>{joint.limits->lower, joint.limits->upper});
-    form.number("limit_restitution", joint.limits->restitution, files::kPart);
+    form.number("limit_restitution", joint.limits->restitution, kPart);
     if (!form.units() || angle) return;
     joint.limits->lower /= form.units()->length;
     joint.limits->upper /= form.units()->length;

@@ -2,25 +2,21 @@
 //
 // The force along the coordinate that makes its speed the wanted one, or the largest one towards
 // it. With gains it follows target + rate t by the law in joint_spring.cpp.
-
 #include "bounds.hpp"
 #include "joints/laws/joint_law_effect.hpp"
 
 namespace tether::scene::effects {
-
-using namespace mechanics;
 
 namespace {
 
 bool has_motor(const Joint& joint) { return joint.motor.has_value(); }
 bool is_ideal(const Joint& joint) { return joint.motor && !joint.motor->has_gains(); }
 
-class JointMotorEffect : public JointLawEffect {
- public:
+struct JointMotorEffect : JointLawEffect {
   JointMotorEffect() : JointLawEffect("motors", has_motor) {}
   bool has_joint_laws(const Scene& scene) const override { return any_of(scene.joints, is_ideal); }
-  void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
-    form.table("motor", joint.motor, [&](const files::Form& motor, JointMotor& m) {
+  void joint_fields(const Form& form, bool angle, Joint& joint) const override {
+    form.table("motor", joint.motor, [&](const Form& motor, JointMotor& m) {
       motor.along(angle, "rate", m.rate, kSpeed);
       stiffness(motor, angle, m.stiffness);
       damping(motor, angle, m.damping);
@@ -31,8 +27,8 @@ class JointMotorEffect : public JointLawEffect {
         motor.require(bound, angle ? "the largest one, N m; not needed with gains"
                                    : "the largest one, N; not needed with gains");
       if (motor.in() ? motor.in()->has(bound) : std::isfinite(m.bound))
-        motor.number(bound, m.bound, files::kNotNegative, unit);
-      if (files::Fields* in = motor.in(); in && !(m.stiffness > 0))
+        motor.number(bound, m.bound, kNotNegative, unit);
+      if (Fields* in = motor.in(); in && !(m.stiffness > 0))
         for (const char* key : {"target", "target_deg", "target_rad"})
           if (in->has(key)) in->wrong(key, "is of a stiffness above 0");
       if (m.stiffness > 0) motor.along(angle, "target", m.target, kMetres);

@@ -17,13 +17,10 @@
 
 #include "bounds.hpp"
 #include "joints/coordinate.hpp"
-#include "joints/laws/force_table.hpp"
 #include "joints/laws/joint_law_effect.hpp"
 #include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
-
-using namespace mechanics;
 
 namespace {
 
@@ -153,8 +150,7 @@ struct Sprung : Gains {
   }
 };
 
-class JointSprings : public PairForces<Sprung> {
- public:
+struct JointSprings : PairForces<Sprung> {
   JointSprings(const Scene& scene, const Bodies& bodies) {
     each_gains(scene, [&](const Joint& joint, std::size_t number, const Gains& gains) {
       for (const joints::Coordinate& each : joints::coordinates_of(joint, number, bodies))
@@ -188,11 +184,11 @@ bool is_table(const ForceTable& table) {
   return last[1] > 0;
 }
 
-void table_fields(const files::Form& form, const char* gain, const char* only, const Unit& number,
+void table_fields(const Form& form, const char* gain, const char* only, const Unit& number,
                   const Unit& force, ForceTable& table) {
   const std::string key = std::string(gain) + "_table";
   form.rows(key, table, kMostRows, number, force);
-  files::Fields* in = form.in();
+  Fields* in = form.in();
   if (!in || !in->has(key)) return;
   if (only)
     in->wrong(key, only);
@@ -204,25 +200,23 @@ void table_fields(const files::Form& form, const char* gain, const char* only, c
                                kMostRows));
 }
 
-class JointSpringEffect : public JointLawEffect {
- public:
+struct JointSpringEffect : JointLawEffect {
   JointSpringEffect() : JointLawEffect("joint springs", has_spring) {}
   bool has_joint_laws(const Scene&) const override { return false; }
   ActsOn acts_on() const override { return ActsOn::turns; }
 
-  void joint_fields(const files::Form& form, bool angle, Joint& joint) const override {
+  void joint_fields(const Form& form, bool angle, Joint& joint) const override {
     const bool is_free = joints::type(joint.kind).is_free();
     const Unit force = angle ? kMoment : kForce;
-    form.table("spring", joint.spring, [&](const files::Form& in, JointSpring& spring) {
+    form.table("spring", joint.spring, [&](const Form& in, JointSpring& spring) {
       if (in.in() || spring.stiffness_table.empty()) stiffness(in, angle, spring.stiffness);
       if (in.in() || spring.damping_table.empty()) damping(in, angle, spring.damping);
       table_fields(in, "stiffness", nullptr, angle ? Unit{} : kMetres, force,
                    spring.stiffness_table);
       table_fields(in, "damping", is_free ? nullptr : "is of hinges and sliders",
                    angle ? kTurning : kSpeed, force, spring.damping_table);
-      if (files::Fields* read = in.in(); read && !(spring.stiffness > 0 || spring.damping > 0) &&
-                                         !read->has("stiffness_table") &&
-                                         !read->has("damping_table"))
+      if (Fields* read = in.in(); read && !(spring.stiffness > 0 || spring.damping > 0) &&
+                                  !read->has("stiffness_table") && !read->has("damping_table"))
         read->missing("stiffness", angle ? "give stiffness (N m/rad), damping (N m s/rad) or both"
                                          : "give stiffness (N/m), damping (N s/m) or both");
       if (is_free) in.along(angle, "rest", spring.rest, kMetres);

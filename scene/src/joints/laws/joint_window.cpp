@@ -1,13 +1,10 @@
 // Tether: joints that attach, detach and break. SPDX-License-Identifier: BSD-3-Clause
 //
 // The engine of switching/ moves them; here are their fields.
-
 #include "joints/joint_type.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
-
-using namespace mechanics;
 
 namespace {
 
@@ -20,20 +17,19 @@ bool switches(const Joint& joint) {
 }
 bool breaks(const Joint& joint) { return joint.window && joint.window->breaks(); }
 
-class JointWindowEffect : public Effect {
- public:
+struct JointWindowEffect : Effect {
   ActsOn acts_on() const override { return ActsOn::all_joints; }
 
-  void joint_fields(const files::Form& form, bool, Joint& joint) const override {
-    files::Fields* const in = form.in();
+  void joint_fields(const Form& form, bool, Joint& joint) const override {
+    Fields* const in = form.in();
     if (in && !joint.window && any_of(kKeys, [&](const char* key) { return in->has(key); }))
       joint.window.emplace();
     if (!joint.window) return;
     JointWindow& w = *joint.window;
     const auto number = [&](const char* key, double& x, const Unit& unit) {
-      if (in ? in->has(key) : std::isfinite(x)) form.number(key, x, files::kPositive, unit);
+      if (in ? in->has(key) : std::isfinite(x)) form.number(key, x, kPositive, unit);
     };
-    form.number("from", w.from, files::kNotNegative, kSeconds);
+    form.number("from", w.from, kNotNegative, kSeconds);
     number("to", w.to, kSeconds);
     number("break_force", w.break_force, kForce);
     number("break_moment", w.break_moment, kMoment);
@@ -51,7 +47,7 @@ class JointWindowEffect : public Effect {
                 "spring, has none");
   }
 
-  void check(const Scene& scene, files::Report& report) const override {
+  void check(const Scene& scene, Report& report) const override {
     if (!any_of(scene.joints, has_window)) return;
     for (const Joint& joint : scene.joints) {
       if (!joint.window || joint.window->to > joint.window->from) continue;
@@ -70,11 +66,9 @@ class JointWindowEffect : public Effect {
                  "is not for scenes whose joints attach, detach or break");
   }
 
-  void plan(const Scene& scene, EngineKind, std::vector<PlannedEffect>& lines) const override {
-    const auto switching = count_if(scene.joints, switches);
-    const auto breaking = count_if(scene.joints, breaks);
-    if (switching > 0) lines.push_back({"attach, detach", counted(switching, "joint")});
-    if (breaking > 0) lines.push_back({"breaking", counted(breaking, "joint")});
+  void plan(const Scene& scene, EngineKind, Lines& lines) const override {
+    add_count(lines, "attach, detach", count_if(scene.joints, switches), "joint");
+    add_count(lines, "breaking", count_if(scene.joints, breaks), "joint");
   }
 };
 

@@ -1,17 +1,55 @@
-// Tether: one cable in the axes of its bodies. SPDX-License-Identifier: BSD-3-Clause
+// Tether: springs and cables: tensions, and the slip of cables over rings at which they rub.
+// SPDX-License-Identifier: BSD-3-Clause
 //
 // With L the sum of the distances from point to point, and s = L - rest - winch t:
 //
 //   tension T = max(0, k s + c ds/dt) where s > 0, else 0; where the cable rubs at a ring this is
 //   the mean of the tensions before and behind it
+//
+// With the lengths L_1 before and L_2 behind the ring, the tensions T_1 and T_2 there, their mean
+// T, the wrap angle beta and a pulley of radius r that turns with w about its axis u:
+//
+//   slip y' = L_2' - L_1' + winch - 2 r u.w       the cable feeds from its first end
+//   x = (T_1 - T_2) / 2,  |x| <= T tanh(mu beta / 2),  x opposes y', and is the bound where it
+//   slips
+//
+// which is e^(-mu beta) <= T_2 / T_1 <= e^(mu beta). T L' + x y' is the power of both tensions.
 #pragma once
+
+#include <map>
 
 #include "mechanics/effect.hpp"
 #include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
 
-using namespace mechanics;
+inline bool is_cable(const Spring& spring) { return spring.cable.has_value(); }
+
+/// The largest inverse mass of a point of a body in any direction, 1/kg.
+inline double softness(const Bodies& bodies, int body, const Vector3d& where) {
+  if (!bodies.moves(body)) return 0.0;
+  const Inertia& inertia = bodies.inertia[at(body)];
+  return 1 / inertia.mass + where.squaredNorm() * inertia.inverse.trace();
+}
+
+/// Explicit springs of a semi-implicit step need dt^2 k / m < 4 and dt c / m < 2; together
+/// dt^2 k + 2 dt c < 4 m. `inverse`: 1 / m along the spring.
+inline void check_tension_step(const Scene& scene, const Spring& spring, double inverse,
+                               double dt) {
+  if ((dt * spring.stiffness + 2 * spring.damping) * dt * inverse < 4) return;
+  const double c = 2 * spring.damping * inverse, k = spring.stiffness * inverse;
+  const double most = k > 0 ? (std::sqrt(c * c + 16 * k) - c) / (2 * k) : 4 / c;
+  throw std::invalid_argument(fmt::format(
+      "{}:{}: {} \"{}\": a step of {:g} s is too long for it to be stable; stepping.step "
+      "must be below about {:g} s (or, without contacts, use the smooth engine)",
+      scene.file, spring.place.line, spring.cable ? "cable" : "spring", spring.name, dt, most));
+}
+
+inline void report_tension(std::size_t index, const SpringForce& force, Forces& forces) {
+  forces.springs.resize(std::max(forces.springs.size(), index + 1));
+  forces.springs[index] = force;
+  forces.springs[index].tension_second = force.tension;
+}
 
 struct CablePoint {
   int body;
@@ -126,6 +164,45 @@ struct CableTension {
  private:
   CableTension(const CableItem& of, double time, const std::pair<double, double>& now)
       : CableTension(of, time, now.first, now.second) {}
+};
+
+class CapstanSlip {
+ public:
+  /// `bodies`: at t = 0.
+  CapstanSlip(const Spring& spring, std::size_t number, const Bodies& bodies);
+
+  int cable() const { return static_cast<int>(item_.index); }  ///< of the scene's springs
+  /// y' is rate() less this.
+  double wanted() const { return -item_.winch; }
+  double bound(const Bodies& bodies) const;
+  double rate(const Bodies& bodies) const;
+  /// The rate of rate() without accelerations of the bodies.
+  double rest(const Bodies& bodies) const;
+  /// The loads of x = 1: f(body, wrench) once for each body that moves.
+  template <class F>
+  void each_load(const Bodies& bodies, const F& f) const {
+    std::map<int, Wrench<double>> loads;
+    item_.each_wrench(
+        bodies, [this](std::size_t k) { return sign(k); },
+        [&](int body, const Wrench<double>& wrench) {
+          Wrench<double>& sum = loads.try_emplace(body, no_wrench<double>()).first->second;
+          sum.force += wrench.force;
+          sum.torque += wrench.torque;
+        });
+    loads.at(ring().body).torque -=
+        2 * law_.radius * (item_.frame(bodies, at(law_.ring)).R * axis_);
+    for (const auto& [body, wrench] : loads)
+      if (bodies.moves(body)) f(body, wrench);
+  }
+
+ private:
+  const CablePoint& ring() const { return item_.points[at(law_.ring)]; }
+  /// Sign of a piece: 1 before the ring, -1 behind it.
+  double sign(std::size_t piece) const { return piece < at(law_.ring) ? 1 : -1; }
+
+  CableItem item_;
+  Capstan law_;
+  Vector3d axis_;  // of the pulley, in axes of the ring's body
 };
 
 }  // namespace tether::scene::effects
