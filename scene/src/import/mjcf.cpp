@@ -15,7 +15,6 @@ namespace tether::scene::import {
 
 namespace {
 
-using mjcf::Geom;
 using mjcf::InertiaFrom;
 using mjcf::Names;
 using mjcf::Settings;
@@ -210,7 +209,7 @@ void Reader::inertial(const Node& node, int of) {
 
 void Reader::geom(const Node& node, int of, const Around& around) {
   if (!around.suffix.empty() && ++repeated_ > kMostListed) return;
-  Geom geom = mjcf::read_geom(node, around.class_name, settings_, problems_, model_.remarks);
+  Matter geom = mjcf::read_geom(node, around.class_name, settings_, problems_, model_.remarks);
   if (of < 0) {  // of the world
     if (geom.shapes.empty()) return;
     geom.mass = 0;

@@ -11,7 +11,7 @@ namespace tether::scene::import::mjcf {
 
 enum class InertiaFrom { as_said, geoms, inertial };
 
-/// What <compiler>, <default> and <asset> say.
+/// The settings of <compiler>, <default> and <asset>.
 struct Settings {
   double angle = linalg::kPi / 180;  ///< rad: the unit of angles
   std::string euler = "xyz";  ///< lower case: about carried axes, upper case: about fixed ones
@@ -47,16 +47,11 @@ std::optional<std::pair<double, double>> limits_of(Tag& tag, const char* key,
 /// go to the model.
 Settings read_settings(const Node& root, Model& model, Problems& problems);
 
-/// A <geom> in the frame of its body: without mass where its group has none; of one shape, or of
-/// none where nothing that scenes have touches, and touching unless its contype and conaffinity
-/// say that it never does.
-struct Geom : Matter {
-  std::string name;
-};
-
-/// A <geom> of a body in this class. A mass < 0: nobody knows it.
-Geom read_geom(const Node& node, const std::string& class_name, const Settings& settings,
-               Problems& problems, Remarks& remarks);
+/// A <geom> of a body in this class, in the frame of the body: without mass where its group has
+/// none, < 0 where nobody knows it; of one shape, or of none where nothing that scenes have
+/// touches; touching unless its contype and conaffinity say that it never does.
+Matter read_geom(const Node& node, const std::string& class_name, const Settings& settings,
+                 Problems& problems, Remarks& remarks);
 
 /// Names that an MJCF file gives, by kind. An attribute that names nothing of its kind is wrong.
 struct Names {

@@ -107,10 +107,10 @@ std::optional<Touch> read_touch(Tag& tag) {
 
 }  // namespace
 
-Geom read_geom(const Node& node, const std::string& class_name, const Settings& settings,
-               Problems& problems, Remarks& remarks) {
+Matter read_geom(const Node& node, const std::string& class_name, const Settings& settings,
+                 Problems& problems, Remarks& remarks) {
   Tag tag(node, problems, settings.defaults(node, class_name, problems));
-  Geom out;
+  Matter out;
   out.name = tag.text("name");
   if (tag.has("name")) tag.name("name", "");
   const std::string type = tag.text("type", tag.has("mesh") ? "mesh" : "sphere");

@@ -14,10 +14,9 @@ struct PlacedJoint : LinkJoint {
 
 /// Links that are welded to each other, as one body in the frame of the first of them.
 struct Part : Matter {
-  std::string name;
   std::vector<std::string> links;
   std::vector<Isometry3d> places;   ///< of the links, in the frame of the first
-  int line = 0, parent = -1;        ///< an earlier part; -1: the world
+  int parent = -1;                  ///< an earlier part; -1: the world
   std::vector<PlacedJoint> joints;  ///< none: fixed
   bool gone = false;                ///< folded into another one, or left out
   bool scenery = false;

@@ -82,8 +82,10 @@ struct Touch {
   }
 };
 
-/// What weighs and touches as one, in a frame of its own.
+/// A part of a robot that weighs and touches as one, in a frame of its own.
 struct Matter {
+  std::string name;
+  int line = 0;
   double mass = 0;                      ///< kg
   Vector3d centre = Vector3d::Zero();   ///< m
   Matrix3d inertia = Matrix3d::Zero();  ///< about the centre
@@ -95,13 +97,11 @@ struct Matter {
 };
 
 struct Link : Matter {
-  std::string name;
   int parent = -1;  ///< an earlier link; -1: the world
   Isometry3d pose = Isometry3d::Identity();
   std::vector<LinkJoint> joints;  ///< none: welded to its parent
   bool scenery = false;           ///< a thing of the world, not of the robot
   bool is_weighed = true;         ///< false: the file gives no mass
-  int line = 0;
 };
 
 /// Two links that are held to each other beside the tree; "world": the world.

@@ -41,7 +41,7 @@ class Problems : public files::Report {
     Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
                 line > 0 ? allowed : allowed + " (in a file that it includes)");
   }
-  /// Of an element; `inside`: what is wrong in it.
+  /// The same of an element; `inside`: what is wrong in it.
   void add(const Node& node, std::string_view inside, const std::string& allowed) {
     add(node.GetLineNum(), path(node) + (inside.empty() ? "" : ": ") + std::string(inside), "",
         allowed);
