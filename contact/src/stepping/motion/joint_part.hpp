@@ -53,8 +53,8 @@ class IslandMaker {
  public:
   virtual ~IslandMaker() = default;
   std::vector<std::pair<int, int>> links;  ///< connect the bodies of each mechanism
-  /// Of rolling and torsional friction in the last problem of a step's velocities: one for each
-  /// contact, world axes, N m s.
+  /// Moments of rolling and torsional friction in the last problem of a step's velocities: one for
+  /// each contact, world axes, N m s.
   std::vector<Eigen::Vector3d> moments;
   /// Null: none of its own for this use.
   virtual std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) = 0;
