@@ -1,6 +1,6 @@
 // Tether: bodies behind problems that are given by their matrix. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "problem/matrix_bodies.hpp"
+#include "problem/body_form.hpp"
 
 #include <cmath>
 #include <functional>

@@ -12,7 +12,6 @@
 #include "assemblies.hpp"
 #include "packing.hpp"
 #include "proof/regime_equations.hpp"
-#include "proof/regime_proof.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::contact;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "assembled/infeasible.hpp"
-
 namespace tether::contact::detail {
 namespace {
 

@@ -1,12 +1,49 @@
 // Tether: the stages of a solve and the order of their turns. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "assembled/local_solves.hpp"
+#include <memory>
+
+#include "assembled/search/search.hpp"
 #include "assembled/stages/accelerated_sweeps.hpp"
 #include "assembled/stages/interior/interior_point.hpp"
 #include "assembled/stages/proximal_newton.hpp"
 
 namespace tether::contact::detail {
+
+// Sweeps that go on for long do so because of few contacts: where a handful toggle between regimes
+// the errors of the others decay with the distance from them. A round solves these contacts with
+// their neighbours as problems of their own, the impulses of all others held: b - A x of the
+// others.
+class LocalSolves {
+ public:
+  LocalSolves();
+  ~LocalSolves();
+  void reset(int contacts);
+  // One round, at most `budget` of work for each part. True: x has changed; it may be worse at
+  // first, as what has moved disturbs the others.
+  bool run(Search& search, Packed& x, double budget);
+
+ private:
+  struct Part;  // a Search and its stages
+  bool find_errors(Search& search, const Packed& x);
+  bool find_parts(Search& search, const Packed& x);
+  void add_part(const Problem& p, int seed, int largest);
+  bool solve_part(Search& search, int part, double budget, Packed& x);
+
+  int n_ = 0, layers_ = 1;
+  int refused_ = 0;      // rounds that found too many contacts with errors of one size
+  bool solved_ = false;  // a part, in the last round
+  double most_ = 0;      // the largest error, as a velocity relative to its island's scale
+  std::vector<double> error_;
+  std::vector<int> list_, start_, place_;  // contacts part by part; place of a contact in its part
+  std::unique_ptr<Part> part_;
+};
+
+// Looks for normal impulses d with d_n >= 0, d_t = 0, A d = 0 (to round-off) and b.d > tolerance
+// times the velocity scale times the sum of d, in one island. With them d.w = -b.d for all
+// impulses, so that no impulses, of any law, make every w_n >= 0 (method, section 3.4). Work is
+// counted in `search`. False: none was found.
+bool proves_infeasible(Search& search, Packed& d);
 
 // The order of the methods (method, section 10).
 class Automatic {

@@ -1,5 +1,5 @@
 // Tether: the proof that a contact problem has no solution. SPDX-License-Identifier: BSD-3-Clause
-#include "assembled/infeasible.hpp"
+#include "assembled/automatic.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -110,7 +110,7 @@ bool proves_infeasible(Search& search, Packed& d) {
     for (std::size_t i = 0; i < n; ++i)
       for (int c = 0; c < 4; ++c) d[i].v[c] = point[i].v[c] - anchor[i].v[c];
     found = keep_proof(search.system, search.options.tolerance, d);
-    search.system.velocities(point.data(), w.data());
+    velocities(problem, false, point.data(), w.data());
     smooth.counts.work += smooth.test_cost;
     if (rule_out_proofs(search.system, search.options.tolerance, w)) break;
     // The next step from where this one leads.

@@ -1,6 +1,5 @@
 // Tether: solves of the parts of a problem where sweeps do not settle. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "assembled/local_solves.hpp"
 
 #include <algorithm>
 #include <cmath>

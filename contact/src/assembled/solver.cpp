@@ -1,14 +1,120 @@
 // Tether: solver of contact problems. SPDX-License-Identifier: BSD-3-Clause
-#include <tether/contact/solver.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <tether/contact/solver.hpp>
 
-#include "assembled/island_solves.hpp"
+#include "assembled/automatic.hpp"
 #include "law/interface/law.hpp"
 #include "problem/refuse.hpp"
+
+namespace tether::contact::detail {
+
+// Islands are independent, but stages that solve them together couple them. Interior points have
+// one step length for all; the round-off of large impulses in one island hides the error of
+// another; sweeps go on in all until the slowest has ended. So each island is solved as a problem.
+class IslandSolves {
+ public:
+  // Whether a solve by islands is worth while: the measure is one of islands, and no island holds
+  // nearly all contacts (its sweeps would only begin again).
+  static bool serve(const Search& search);
+  // Solves from search.best. If each island is solved by itself but their union is not, `stages` go
+  // on with all of them together.
+  Status run(Search& search, Automatic& stages);
+  // The normal impulses that prove infeasibility; empty: none are known.
+  const Packed& proof() const { return proof_; }
+  void reset() { proof_.clear(); }
+
+ private:
+  struct Island {
+    std::vector<int> contacts;
+    Status status = Status::unsolved;
+  };
+  void solve(Search& search, Island& island, double budget);
+
+  std::vector<Island> islands_;
+  Packed x_, proof_;
+  Search search_;
+  Automatic automatic_;
+};
+
+namespace {
+
+constexpr double kBlock = 20;  // ns that it takes to take a block out of the problem
+
+}  // namespace
+
+bool IslandSolves::serve(const Search& search) {
+  constexpr double kNearlyAll = 0.9;
+  if (search.options.measure != Measure::fixed_point || search.system.islands() < 2) return false;
+  std::vector<int> size(at(search.system.islands()));
+  for (int k : search.system.problem().islands()) ++size[at(k)];
+  return *std::max_element(size.begin(), size.end()) <= kNearlyAll * search.system.size();
+}
+
+void IslandSolves::solve(Search& search, Island& island, double budget) {
+  const std::vector<int>& contacts = island.contacts;
+  const Problem problem = search.system.problem().part(contacts);
+  search.counts.work += kBlock * static_cast<double>(problem.blocks().size());
+  Options options = search.options;
+  options.max_work = budget;
+  search_.reset(problem, options);
+  search_.system.belong_to(search.system, contacts.data());
+  search_.system.share_as(search.system, contacts.data());
+  Packed start;
+  for (int i : contacts) start.push_back(x_[at(i)]);
+  search_.system.to_own_units(start.data());
+  automatic_.reset(problem.contacts(), options);
+  search_.test(start.data(), By::factors);
+  island.status = search_.solved() ? Status::solved : automatic_.run(search_);
+  search.counts.add(search_.counts);
+  search_.system.to_given_units(search_.best.data());
+  for (std::size_t r = 0; r < contacts.size(); ++r) {
+    x_[at(contacts[r])] = search_.best[r];
+    if (search_.system.replaced(static_cast<int>(r))) search.system.replace(contacts[r]);
+  }
+  if (island.status != Status::infeasible || !proof_.empty()) return;
+  proof_.assign(x_.size(), PackedVector());
+  const Packed proof = automatic_.proof();
+  for (std::size_t r = 0; r < contacts.size(); ++r) proof_[at(contacts[r])] = proof[r];
+}
+
+Status IslandSolves::run(Search& search, Automatic& stages) {
+  const std::vector<int>& island_of = search.system.problem().islands();
+  islands_.assign(at(search.system.islands()), {});
+  for (std::size_t i = 0; i < island_of.size(); ++i)
+    islands_[at(island_of[i])].contacts.push_back(static_cast<int>(i));
+  x_ = search.best;
+  // Small islands first, each with an equal part of the work left: larger ones get what these save.
+  std::vector<Island*> order;
+  for (Island& island : islands_) order.push_back(&island);
+  std::stable_sort(order.begin(), order.end(), [](const Island* p, const Island* q) {
+    return p->contacts.size() < q->contacts.size();
+  });
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const double left = search.options.max_work - search.counts.work;
+    if (left > 0)
+      solve(search, *order[k], left / static_cast<double>(order.size() - k));
+    else
+      order[k]->status = Status::work_limit;
+  }
+  // Each island keeps its best point, also if another one is not solved.
+  search.best_error = std::numeric_limits<double>::infinity();
+  search.test(x_.data(), By::factors);
+  if (search.solved()) return Status::solved;
+  // The status that says most comes last in this list.
+  Status out = Status::solved;
+  for (Status s : {Status::unsolved, Status::stalled, Status::cycling, Status::round_off,
+                   Status::work_limit, Status::infeasible})
+    for (const Island& island : islands_)
+      if (island.status == s) out = s;
+  // Solved one by one, but not together: rounding of one island exceeds the tolerance of another.
+  return out == Status::solved ? stages.run(search) : out;
+}
+
+}  // namespace tether::contact::detail
 
 namespace tether::contact {
 
@@ -58,34 +164,11 @@ const char* advice(Status status, const Options& options) {
 
 }  // namespace
 
-const char* name(Measure measure) {
-  switch (measure) {
-    case Measure::fixed_point:
-      return "fixed_point";
-    case Measure::natural_map:
-      return "natural_map";
-  }
-  return "?";
-}
+const char* name(Measure measure) { return detail::text(measure, {"fixed_point", "natural_map"}); }
 
 const char* name(Status status) {
-  switch (status) {
-    case Status::unsolved:
-      return "unsolved";
-    case Status::solved:
-      return "solved";
-    case Status::stalled:
-      return "stalled";
-    case Status::cycling:
-      return "cycling";
-    case Status::work_limit:
-      return "work_limit";
-    case Status::round_off:
-      return "round_off";
-    case Status::infeasible:
-      return "infeasible";
-  }
-  return "?";
+  return detail::text(status, {"unsolved", "solved", "stalled", "cycling", "work_limit",
+                               "round_off", "infeasible"});
 }
 
 struct Solver::Implementation {
@@ -148,10 +231,7 @@ void Solver::Implementation::finish(const Problem& problem, Status status, Solut
   }
   out.counts = search.counts;
   problem.unpack(search.best, out.impulses);
-  if (search.near_round_off())
-    detail::exact_velocities(problem, search.best.data(), x.data());
-  else
-    detail::velocities(problem, search.best.data(), x.data());
+  detail::velocities(problem, search.near_round_off(), search.best.data(), x.data());
   problem.unpack(x, out.velocities);
   out.infeasible_direction.clear();
   for (const PackedVector& d : islands.proof().empty() ? stages.proof() : islands.proof())

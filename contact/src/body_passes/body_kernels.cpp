@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "kernels/body_pass.hpp"
+#include "kernels/body_contacts.hpp"
 #include "law/interface/law.hpp"
 
 namespace tether::contact::detail {
@@ -99,31 +99,21 @@ TETHER_INLINE Squares pass(const BodyArrays& s, SmoothContact* begin, SmoothCont
 }
 
 using S = const BodyArrays&;
-using G = GeneralContact*;
-TETHER_CLONES Squares sweep_spheres(S s, SphereContact* b, SphereContact* e) {
-  return pass<false>(s, b, e, nullptr);
+TETHER_CLONES Squares spheres(S s, SphereContact* b, SphereContact* e, Coupled c) {
+  return c ? pass<true>(s, b, e, c) : pass<false>(s, b, e, c);
 }
-TETHER_CLONES Squares test_spheres(S s, SphereContact* b, SphereContact* e, Coupled c) {
-  return pass<true>(s, b, e, c);
-}
-TETHER_CLONES Squares sweep_smooth(S s, SmoothContact* b, SmoothContact* e) {
-  return pass<false>(s, b, e, nullptr);
-}
-TETHER_CLONES Squares test_smooth(S s, SmoothContact* b, SmoothContact* e, Coupled c) {
-  return pass<true>(s, b, e, c);
+TETHER_CLONES Squares smooth(S s, SmoothContact* b, SmoothContact* e, Coupled c) {
+  return c ? pass<true>(s, b, e, c) : pass<false>(s, b, e, c);
 }
 
 }  // namespace
 
-Squares sweep(S s, Law law, G b, G e) { return kernels(law).bodies.sweep(s, b, e); }
-Squares test(S s, Law law, G b, G e, Coupled c) { return kernels(law).bodies.test(s, b, e, c); }
-Squares sweep(S s, Law, SphereContact* b, SphereContact* e) { return sweep_spheres(s, b, e); }
-Squares test(S s, Law, SphereContact* b, SphereContact* e, Coupled c) {
-  return test_spheres(s, b, e, c);
+Squares pass(S s, Law law, GeneralContact* b, GeneralContact* e, Coupled c) {
+  return kernels(law).pass(s, b, e, c);
 }
-Squares sweep(S s, Law, SmoothContact* b, SmoothContact* e) { return sweep_smooth(s, b, e); }
-Squares test(S s, Law, SmoothContact* b, SmoothContact* e, Coupled c) {
-  return test_smooth(s, b, e, c);
+Squares pass(S s, Law, SphereContact* b, SphereContact* e, Coupled c) {
+  return spheres(s, b, e, c);
 }
+Squares pass(S s, Law, SmoothContact* b, SmoothContact* e, Coupled c) { return smooth(s, b, e, c); }
 
 }  // namespace tether::contact::detail

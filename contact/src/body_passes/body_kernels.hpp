@@ -5,22 +5,15 @@
 
 namespace tether::contact::detail {
 
-// One pass of Gauss-Seidel; returns |D dx|^2, D the diagonal block.
-Squares sweep(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end);
-Squares sweep(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end);
-Squares sweep(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end);
-
-// Changes nothing; the errors |theta D dx|^2 of the contacts (method, section 3). coupled: theta of
-// each contact.
-Squares test(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end, Coupled);
-Squares test(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end, Coupled);
-Squares test(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end, Coupled);
-
-// Groups of four; false: this machine has no code for them.
-bool groups_are_served();
-Squares sweep(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end);
-Squares sweep(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end);
-Squares test(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end, Coupled);
-Squares test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Coupled);
+// coupled = null: one pass of Gauss-Seidel; returns |D dx|^2, D the diagonal block. Otherwise
+// nothing changes, and the errors |theta D dx|^2 of the contacts are returned (method, section 3),
+// coupled: theta of each.
+Squares pass(const BodyArrays& s, Law law, GeneralContact* begin, GeneralContact* end, Coupled);
+Squares pass(const BodyArrays& s, Law, SphereContact* begin, SphereContact* end, Coupled);
+Squares pass(const BodyArrays& s, Law, SmoothContact* begin, SmoothContact* end, Coupled);
+// The same over groups of four.
+Squares pass(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end, Coupled);
+Squares pass(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Coupled);
+bool groups_are_served();  // false: this machine has no code for groups
 
 }  // namespace tether::contact::detail

@@ -71,16 +71,10 @@ bool groups_are_served() {
   static const bool served = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   return served;
 }
-Squares sweep(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end) {
-  return kernels(law).groups.pass(s, begin, end, nullptr);
+Squares pass(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end, Coupled c) {
+  return kernels(law).group_pass(s, begin, end, c);
 }
-Squares test(const BodyArrays& s, Law law, GeneralGroup* begin, GeneralGroup* end, Coupled c) {
-  return kernels(law).groups.pass(s, begin, end, c);
-}
-Squares sweep(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end) {
-  return avx2::spheres(s, begin, end, nullptr);
-}
-Squares test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Coupled c) {
+Squares pass(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Coupled c) {
   return avx2::spheres(s, begin, end, c);
 }
 
@@ -91,10 +85,8 @@ Squares test(const BodyArrays& s, Law, SphereGroup* begin, SphereGroup* end, Cou
 namespace tether::contact::detail {
 
 bool groups_are_served() { return false; }
-Squares sweep(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*) { return {}; }
-Squares test(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*, Coupled) { return {}; }
-Squares sweep(const BodyArrays&, Law, SphereGroup*, SphereGroup*) { return {}; }
-Squares test(const BodyArrays&, Law, SphereGroup*, SphereGroup*, Coupled) { return {}; }
+Squares pass(const BodyArrays&, Law, GeneralGroup*, GeneralGroup*, Coupled) { return {}; }
+Squares pass(const BodyArrays&, Law, SphereGroup*, SphereGroup*, Coupled) { return {}; }
 
 }  // namespace tether::contact::detail
 

@@ -5,7 +5,7 @@
 #include <tether/contact/body_solver.hpp>
 #include <vector>
 
-#include "graph/graph_parts.hpp"
+#include "graph/contact_graph.hpp"
 #include "kernels/body_contacts.hpp"
 #include "problem/contact_side.hpp"
 

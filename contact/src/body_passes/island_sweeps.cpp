@@ -91,7 +91,7 @@ PassResult IslandSweeps::over_kinds(int chunk, const Team& team, const Operation
 PassResult IslandSweeps::sweep(const Island& island, Team& team) {
   return pass(island, team, Pass::moves_bodies, [&](int chunk) {
     return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end, Coupled) {
-      return detail::sweep(s, law_, begin, end);
+      return detail::pass(s, law_, begin, end, nullptr);
     });
   });
 }
@@ -99,7 +99,7 @@ PassResult IslandSweeps::sweep(const Island& island, Team& team) {
 PassResult IslandSweeps::test(const Island& island, Team& team) {
   return pass(island, team, Pass::reads_bodies, [&](int chunk) {
     return over_kinds(chunk, team, [&](const BodyArrays& s, auto* begin, auto* end, Coupled c) {
-      return detail::test(s, law_, begin, end, c);
+      return detail::pass(s, law_, begin, end, c);
     });
   });
 }

@@ -4,8 +4,6 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "body_passes/moving_bodies.hpp"
-
 namespace tether::contact::detail {
 
 using linalg::at;
@@ -98,6 +96,31 @@ double* impulses(GeneralContact& c) { return c.x; }
 double* impulses(SphereContact& c) { return c.p; }
 double* impulses(SmoothContact& c) { return &c.x; }
 
+// The impulse in world axes.
+Vector3d world_impulse(const SmoothContact& c) { return c.x * load(c.n); }
+Vector3d world_impulse(const SphereContact& c) { return load(c.p); }
+Vector3d world_impulse(const GeneralContact& c) {
+  const Vector3d n = load(c.n), t = load(c.t);
+  return c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t);
+}
+void set_world_impulse(SmoothContact& c, const Vector3d& p) { c.x = p.dot(load(c.n)); }
+void set_world_impulse(SphereContact& c, const Vector3d& p) { store(p, c.p); }
+void set_world_impulse(GeneralContact& c, const Vector3d& p) {
+  const Vector3d n = load(c.n), t = load(c.t);
+  store({p.dot(n), p.dot(t), p.dot(n.cross(t))}, c.x);
+}
+
+// All that a sweep changes.
+Eigen::Vector4d state_of(const SmoothContact& c) { return {c.x, 0, 0, 0}; }
+Eigen::Vector4d state_of(const SphereContact& c) { return load(c.p).homogeneous(); }
+Eigen::Vector4d state_of(const GeneralContact& c) { return {c.x[0], c.x[1], c.x[2], c.lambda}; }
+void set_state_of(SmoothContact& c, const Eigen::Vector4d& s) { c.x = s[0]; }
+void set_state_of(SphereContact& c, const Eigen::Vector4d& s) { store(s.head<3>(), c.p); }
+void set_state_of(GeneralContact& c, const Eigen::Vector4d& s) {
+  store(s.head<3>(), c.x);
+  c.lambda = s[3];
+}
+
 template <class Entry>
 constexpr int kImpulses = 3;
 template <>
@@ -134,7 +157,7 @@ double PackedContacts::pack(Kind k, int place, const Side& side, const PointCont
       put(between(packed_sphere(side, c, slip)), k, place);
       break;
     case Kind::smooth:
-      smooth_[at(place)] = between(packed_smooth(side));
+      put(between(packed_smooth(side)), k, place);
       break;
     case Kind::general:
     case Kind::general4:
@@ -144,72 +167,57 @@ double PackedContacts::pack(Kind k, int place, const Side& side, const PointCont
   return slip;
 }
 
-GeneralContact PackedContacts::general(Kind k, int place) const {
-  if (k == Kind::general) return general_[at(place)];
-  return from_lane<GeneralContact>(general4_[at(place / 4)], place % 4);
-}
-SphereContact PackedContacts::sphere(Kind k, int place) const {
-  if (k == Kind::sphere) return spheres_[at(place)];
-  return from_lane<SphereContact>(spheres4_[at(place / 4)], place % 4);
-}
 void PackedContacts::put(const GeneralContact& c, Kind k, int place) {
-  if (k == Kind::general) {
+  if (k == Kind::general)
     general_[at(place)] = c;
-  } else {
+  else
     to_lane(c, general4_[at(place / 4)], place % 4);
-  }
 }
 void PackedContacts::put(const SphereContact& c, Kind k, int place) {
-  if (k == Kind::sphere) {
+  if (k == Kind::sphere)
     spheres_[at(place)] = c;
-  } else {
+  else
     to_lane(c, spheres4_[at(place / 4)], place % 4);
+}
+
+// f(contact), taken out of its group.
+template <class F>
+auto PackedContacts::read(Kind k, int place, const F& f) const {
+  switch (k) {
+    case Kind::general4:
+      return f(from_lane<GeneralContact>(general4_[at(place / 4)], place % 4));
+    case Kind::sphere4:
+      return f(from_lane<SphereContact>(spheres4_[at(place / 4)], place % 4));
+    case Kind::general:
+      return f(general_[at(place)]);
+    case Kind::sphere:
+      return f(spheres_[at(place)]);
+    case Kind::smooth:
+      break;
   }
+  return f(smooth_[at(place)]);
+}
+
+// The same for a contact that f changes.
+template <class F>
+void PackedContacts::change(Kind k, int place, const F& f) {
+  read(k, place, [&](auto contact) {
+    f(contact);
+    put(contact, k, place);
+  });
 }
 
 Vector3d PackedContacts::impulse(Kind k, int place) const {
-  if (k == Kind::smooth) return smooth_[at(place)].x * load(smooth_[at(place)].n);
-  if (k == Kind::sphere || k == Kind::sphere4) return load(sphere(k, place).p);
-  const GeneralContact c = general(k, place);
-  const Vector3d n = load(c.n), t = load(c.t);
-  return c.x[0] * n + c.x[1] * t + c.x[2] * n.cross(t);
+  return read(k, place, [](const auto& c) { return world_impulse(c); });
 }
-
 void PackedContacts::set_impulse(Kind k, int place, const Vector3d& p) {
-  if (k == Kind::smooth) {
-    smooth_[at(place)].x = p.dot(load(smooth_[at(place)].n));
-  } else if (k == Kind::sphere || k == Kind::sphere4) {
-    SphereContact c = sphere(k, place);
-    store(p, c.p);
-    put(c, k, place);
-  } else {
-    GeneralContact c = general(k, place);
-    const Vector3d n = load(c.n), t = load(c.t);
-    store({p.dot(n), p.dot(t), p.dot(n.cross(t))}, c.x);
-    put(c, k, place);
-  }
+  change(k, place, [&](auto& c) { set_world_impulse(c, p); });
 }
-
 Eigen::Vector4d PackedContacts::state(Kind k, int place) const {
-  if (k == Kind::smooth) return {smooth_[at(place)].x, 0, 0, 0};
-  if (k == Kind::sphere || k == Kind::sphere4) return load(sphere(k, place).p).homogeneous();
-  const GeneralContact c = general(k, place);
-  return {c.x[0], c.x[1], c.x[2], c.lambda};
+  return read(k, place, [](const auto& c) { return state_of(c); });
 }
-
 void PackedContacts::set_state(Kind k, int place, const Eigen::Vector4d& s) {
-  if (k == Kind::smooth) {
-    smooth_[at(place)].x = s[0];
-  } else if (k == Kind::sphere || k == Kind::sphere4) {
-    SphereContact c = sphere(k, place);
-    store(s.head<3>(), c.p);
-    put(c, k, place);
-  } else {
-    GeneralContact c = general(k, place);
-    store(s.head<3>(), c.x);
-    c.lambda = s[3];
-    put(c, k, place);
-  }
+  change(k, place, [&](auto& c) { set_state_of(c, s); });
 }
 
 void PackedContacts::extrapolate(const Chunk& from, const Chunk& to, double beta) {

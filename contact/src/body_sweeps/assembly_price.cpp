@@ -1,5 +1,5 @@
 // Tether: the predicted cost of an island as a Problem. SPDX-License-Identifier: BSD-3-Clause
-#include "body_sweeps/assembly_price.hpp"
+#include "body_sweeps/sweep_control.hpp"
 
 #include <algorithm>
 #include <tether/linalg/block_lu.hpp>
@@ -11,11 +11,11 @@ namespace tether::contact::detail {
 namespace {
 
 // Prices in ns, fitted to times of stacks, lattices, heaps and packings.
-constexpr double kInFours = 22;       // a contact and sweep
-constexpr double kAlone = 48;         // the same of one that is in no group of four
-constexpr double kAssembly = 250;     // a block
-constexpr double kSteps = 10;         // factorisations from sticking to a solution, mostly
-constexpr double kMostSteps = 20;     // of a run of interior points
+constexpr double kInFours = 22;    // a contact and sweep
+constexpr double kAlone = 48;      // the same of one that is in no group of four
+constexpr double kAssembly = 250;  // a block
+constexpr double kSteps = 10;      // factorisations from sticking to a solution, mostly
+constexpr double kMostSteps = kSteps * 2;
 constexpr double kLeastSweeps = 500;  // on the Problem, after which packings begin to end
 
 using linalg::at;

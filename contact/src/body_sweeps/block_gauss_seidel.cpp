@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "body_sweeps/assembly_price.hpp"
 #include "body_sweeps/implementation.hpp"
 #include "body_sweeps/sweep_control.hpp"
 #include "problem/criterion.hpp"
@@ -49,13 +49,15 @@ detail::IslandResult BodySolver::Implementation::start(const Island& island, Tea
 // max_work pays for are made in any case, more while they make progress; max_sweeps end them where
 // they are not cheaper than what would follow.
 struct BodySolver::Implementation::Iteration {
+  using End = IslandResult::End;
+
   Iteration(Implementation& of, int k, Team& on)
       : solver(of),
         island(of.graph.islands[at(k)]),
         team(on),
         price(whole(), whole().islands[at(k)], of.given.first(), of.given.second()),
         best(of.options.max_sweeps) {
-    const bool again = of.results[at(k)].assembled;
+    const bool again = of.results[at(k)].assembled();
     r = again ? of.results[at(k)] : of.start(island, team);
     const double allowed = of.options.tolerance / r.inverse_scale;
     bound = std::max(allowed * allowed, r.floor);
@@ -73,15 +75,16 @@ struct BodySolver::Implementation::Iteration {
       forecast.add(change.sum);
       if (r.sweeps == detail::BestPoint::kFirst && !permitted()) best.want();
       const bool due = forecast.due(r.sweeps);
-      r.ended = limited(change.most) || (due && is_in_vain(change.most));
+      const bool ends = limited(change.most) || (due && is_in_vain(change.most));
+      r.end = ends ? End::at_last_point : End::none;
       if (solves(change.most)) return;
-      if (r.ended) {
+      if (ends) {
         r.status = forecast.no_progress() ? Status::cycling : Status::work_limit;
         if (permitted()) r.assembly = solver.options.max_work;
         return;
       }
       if (due && gives_way(change.most)) return;
-      if (momentum.on()) solver.sweeps.extrapolate(island, team, momentum.next(change.sum));
+      if (momentum) solver.sweeps.extrapolate(island, team, momentum->next(change.sum));
     }
   }
 
@@ -104,19 +107,21 @@ struct BodySolver::Implementation::Iteration {
   }
   // The change by a sweep is close to the residual, which would cost another pass.
   bool solves(double most) {
-    if ((most > bound || r.sweeps < next_test) && island.contacts != 1 && !r.ended) {
+    if ((most > bound || r.sweeps < next_test) && island.contacts != 1 && r.end == End::none) {
       if (best.is_due(r.sweeps, most) && best.improved(solver.sweeps.test(island, team).most))
         solver.save(island, team);
       return false;
     }
     double residual = solver.sweeps.test(island, team).most;
-    if (r.stale && (r.ended || residual <= bound)) {
+    if (r.stale && (r.end != End::none || residual <= bound)) {
       solver.sweeps.refresh(island, team);
       r.stale = false;
       residual = solver.sweeps.test(island, team).most;
     }
-    r.saved = r.ended && !best.last_is_best(residual);
-    if (r.saved) residual = best.residual();
+    if (r.end != End::none && !best.last_is_best(residual)) {
+      r.end = End::at_earlier_point;
+      residual = best.residual();
+    }
     r.error = r.relative(residual);
     if (residual <= bound) r.status = Status::solved;
     next_test = r.sweeps + ++failed_tests;
@@ -128,14 +133,14 @@ struct BodySolver::Implementation::Iteration {
     r.assembly = assembly(std::min(more, more_before));
     if (r.assembly > 0) return true;
     more_before = more;
-    if (more > kSlow && r.sweeps > detail::Forecast::kFirst) momentum.start();
+    if (!momentum && more > kSlow && r.sweeps > detail::Forecast::kFirst) momentum.emplace();
     best.forecast(r.sweeps + more);
     forecast.made();
     return false;
   }
   // Work for an assembled problem where sweeps are forecast to cost more, else 0.
   double assembly(double more) {
-    if (!momentum.on() || !permitted()) return 0;
+    if (!momentum || !permitted()) return 0;
     const double once = price.sweeps(), spent = r.spent / price.sweep();
     if (r.sweeps < std::max(kTried * once, spent) || more < kMoreExpensive * once) return 0;
     return std::min(solver.options.max_work, (spent + kRuns * once) * price.sweep());
@@ -150,7 +155,7 @@ struct BodySolver::Implementation::Iteration {
   int next_test = 0, failed_tests = 0;
   double more_before = 0;  // forecast when it was last due
   detail::Forecast forecast{0, 0};
-  detail::Momentum momentum;
+  std::optional<detail::Momentum> momentum;
   detail::BestPoint best;
 };
 

@@ -65,7 +65,6 @@ void BodySolver::Implementation::take(const Island& island, Worker& worker) {
 void BodySolver::Implementation::assemble(int k, Worker& worker) {
   const Island& island = graph.islands[at(k)];
   IslandResult& r = results[at(k)];
-  r.assembled = true;
   Eigen::VectorXd x;
   const Problem problem = assembled(island, worker, x);
   worker.solver = std::make_unique<Solver>(solver_options(options, r.assembly));
@@ -94,7 +93,9 @@ void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
     assemble(k, worker);
     sweeps.unpack(island, one, *out);
     const bool replaced = !worker.solution.replaced.empty();
-    if (r.ended || r.status == Status::solved || r.status == Status::infeasible) return;
+    if (r.end != IslandResult::End::none || r.status == Status::solved ||
+        r.status == Status::infeasible)
+      return;
     if (!replaced) {
       iterate(k, one);
     } else if (r.status == Status::work_limit && r.assembly < options.max_work) {
@@ -103,7 +104,7 @@ void BodySolver::Implementation::assemble_and_sweep_on(int k, Worker& worker) {
       return;
     }
   }
-  if (!r.saved) sweeps.unpack(island, one, *out);
+  if (!r.saved()) sweeps.unpack(island, one, *out);
 }
 
 // For islands solved as a Problem whose error by the bodies' velocities is above the tolerance.

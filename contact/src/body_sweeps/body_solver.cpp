@@ -17,25 +17,11 @@ namespace {
 
 using detail::kTogether;
 
-// The status of all is that of the worst island.
-int severity(Status s) {
-  switch (s) {
-    case Status::solved:
-      return 0;
-    case Status::work_limit:
-      return 1;
-    case Status::round_off:
-    case Status::stalled:
-      return 2;
-    case Status::cycling:
-      return 3;
-    case Status::infeasible:
-      return 5;
-    case Status::unsolved:
-      break;
-  }
-  return 4;
-}
+// The status of all is that of the worst island: an order of the enumerators of Status.
+constexpr int kSeverity[] = {/*unsolved*/ 4,   /*solved*/ 0,    /*stalled*/ 2,
+                             /*cycling*/ 3,
+                             /*work_limit*/ 1, /*round_off*/ 2, /*infeasible*/ 5};
+int severity(Status s) { return kSeverity[static_cast<int>(s)]; }
 
 void check(const BodyOptions& o) {
   using detail::require;
@@ -70,7 +56,7 @@ void BodySolver::Implementation::together(int k, Team& team) {
   }
   team.meet();
   const IslandResult& r = results[at(k)];
-  if (!(r.assembly > 0) && !r.saved) sweeps.unpack(island, team, *out);
+  if (!(r.assembly > 0) && !r.saved()) sweeps.unpack(island, team, *out);
 }
 
 void BodySolver::Implementation::alone(int k, Worker& worker) {
@@ -82,7 +68,7 @@ void BodySolver::Implementation::alone(int k, Worker& worker) {
     iterate(k, team);
   }
   if (r.assembly > 0) return assemble_and_sweep_on(k, worker);
-  if (!r.saved) sweeps.unpack(island, team, *out);
+  if (!r.saved()) sweeps.unpack(island, team, *out);
 }
 
 void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
@@ -174,7 +160,7 @@ void BodySolver::Implementation::report() {
     out->sweeps = std::max(out->sweeps, r.sweeps);
     out->colours =
         std::max(out->colours, graph.islands[k].colour_end - graph.islands[k].colour_begin);
-    out->assembled_islands += r.assembled;
+    out->assembled_islands += r.assembled();
     if (r.status == Status::solved) continue;
     ++out->failed_islands;
     out->status = worse(out->status, r.status);

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "assembled/search/system.hpp"
+#include "assembled/search/search.hpp"
 #include "body_passes/given_problem.hpp"
 #include "body_sweeps/wide_velocities.hpp"
 #include "graph/contact_graph.hpp"
@@ -63,6 +63,19 @@ class Scales {
   std::vector<double> coupled_, inverse_, floor_;
 };
 
+// Block fixed point of a contact with theta contacts in its row (method, section 3), a velocity.
+double fixed_point(Law law, const LocalBlock& L, double mu, const double* gamma,
+                   const detail::Wide3& x, const detail::Wide3& u, double theta) {
+  const detail::Wide3 share = u / static_cast<detail::Wide>(theta);
+  Eigen::Vector3d b;
+  detail::wide_rhs(L, x.data(), share.data(), b.data());
+  LocalState state;
+  for (int k = 0; k < 3; ++k) state.x[k] = static_cast<double>(x[k]);
+  solve_local(law, L, b, state);
+  return static_cast<double>(
+      theta * detail::wide_error(L, mu, gamma, x.data(), share.data(), state.x, state.regime));
+}
+
 }  // namespace
 
 Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
@@ -94,51 +107,28 @@ Residuals evaluate(const std::vector<RigidBody>& bodies, const std::vector<Point
   const detail::LawKernels& rule = detail::kernels(law);
   const Scales scales(given, rule.friction, blocks);
   Residuals r;
-  r.fixed_point = 0;
-  r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
+  r.fixed_point = r.signorini = r.cone = r.alignment = r.dissipation = r.energy_change = 0;
   double map = 0, xx = 0, ww = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const PointContact& c = contacts[i];
-    const Eigen::Matrix3d F = tangent_frame(c.normal);
+    const Eigen::Matrix3d F = tangent_frame(contacts[i].normal);
     const LocalBlock& L = blocks[i];
     const detail::Wide3 wide_x = F.cast<detail::Wide>() * impulses[i].cast<detail::Wide>();
-    const detail::Wide3 wide_u = F.cast<detail::Wide>() * velocities.relative(c);
+    const detail::Wide3 wide_u = F.cast<detail::Wide>() * velocities.relative(contacts[i]);
     const Eigen::Vector3d x = wide_x.cast<double>(), u = wide_u.cast<double>();
-    const double mu = rule.friction ? c.mu : 0, t = x.tail<2>().norm();
-    r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], u[0])));
-    r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
-    r.dissipation += x.dot(u);
-    r.energy_change += 0.5 * x.dot(u + F * before[i]);
-    // Block fixed point (method, section 3).
-    const double theta = scales.coupled(i);
-    const detail::Wide3 share = wide_u / static_cast<detail::Wide>(theta);
-    Eigen::Vector3d rhs;
-    detail::wide_rhs(L, wide_x.data(), share.data(), rhs.data());
-    LocalState state;
-    for (int k = 0; k < 3; ++k) state.x[k] = x[k];
-    solve_local(law, L, rhs, state);
+    const Eigen::Vector3d b = -(F * before[i]);
+    const double mu = rule.friction ? contacts[i].mu : 0;
     double gamma[2];
     rule.gamma(L, gamma);
-    const double error = scales.relative(
-        i, static_cast<double>(theta * detail::wide_error(L, mu, gamma, wide_x.data(), share.data(),
-                                                          state.x, state.regime)));
+    detail::add_residuals(L, mu, gamma, x.data(), u.data(), b.data(), r);
+    const double error =
+        scales.relative(i, fixed_point(law, L, mu, gamma, wide_x, wide_u, scales.coupled(i)));
     if (!(error <= r.fixed_point)) r.fixed_point = error;
     if (error != error) return {};  // velocities out of range
-    // Natural map, and the nearest slip that the law allows.
     Eigen::Vector3d z;
     rule.natural_point(L, x.data(), u.data(), z.data());
     map += (x - z).squaredNorm();
     xx += x.squaredNorm();
     ww += u.squaredNorm();
-    if (mu == 0 || !(x[0] > 0)) continue;
-    double misfit = u.tail<2>().norm();
-    if (t > 0 && t >= mu * x[0] * (1 - 1e-9)) {
-      const Eigen::Vector2d d = -(x.tail<2>() / t + Eigen::Vector2d(gamma[0], gamma[1]));
-      const double dd = d.squaredNorm();
-      const double s = dd > 0 ? std::max(0.0, u.tail<2>().dot(d) / dd) : 0;
-      misfit = (u.tail<2>() - s * d).norm();
-    }
-    r.alignment = std::max(r.alignment, misfit);
   }
   const double size = std::max({bb, xx, ww});
   r.natural_map = size > 0 ? std::sqrt(map) / std::sqrt(size) : std::sqrt(map);

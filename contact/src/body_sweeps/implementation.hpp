@@ -1,18 +1,86 @@
 // Tether: the parts of BodySolver, and what they do together. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <exception>
+#include <limits>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <tether/contact/body_solver.hpp>
+#include <utility>
 #include <vector>
 
 #include "body_passes/given_problem.hpp"
 #include "body_passes/island_sweeps.hpp"
+#include "body_passes/worker_team.hpp"
 #include "body_sweeps/impulse_memory.hpp"
-#include "body_sweeps/workers.hpp"
 #include "graph/contact_graph.hpp"
 
 namespace tether::contact::detail {
+
+// Data of one thread.
+struct Worker {
+  PassScratch scratch;
+  // Data of an assembled island.
+  std::unique_ptr<Solver> solver;
+  Solution solution;
+  std::vector<RigidBody> bodies;
+  std::vector<ContactRows> contacts;
+  std::vector<int> replaced;  // contacts, of all islands
+  std::exception_ptr failure;
+};
+
+class Workers {
+ public:
+  // work(worker, team of all threads), on `threads` threads at once; rethrows what one has thrown,
+  // and throws std::invalid_argument for the first contact that was refused.
+  template <class Work>
+  void run(int threads, const Work& work) {
+    prepare(threads);
+    auto on_thread = [&](int thread) {
+      Worker& worker = *workers_[static_cast<std::size_t>(thread)];
+      Team all{thread, threads, &team_.barrier, &worker.scratch};
+      work(worker, all);
+    };
+    team_.run(threads, on_thread);
+    report();
+  }
+  // Contacts with another law, in ascending order.
+  void replaced(std::vector<int>& out) const {
+    out.clear();
+    for (const auto& worker : workers_)
+      out.insert(out.end(), worker->replaced.begin(), worker->replaced.end());
+    std::sort(out.begin(), out.end());
+  }
+
+ private:
+  void prepare(int threads) {
+    while (static_cast<int>(workers_.size()) < threads)
+      workers_.push_back(std::make_unique<Worker>());
+    for (auto& worker : workers_) {
+      worker->replaced.clear();
+      worker->failure = nullptr;
+      worker->scratch.refused = std::numeric_limits<int>::max();
+    }
+  }
+  void report() const {
+    const auto first = std::min_element(
+        workers_.begin(), workers_.end(),
+        [](const auto& a, const auto& b) { return a->scratch.refused < b->scratch.refused; });
+    if ((*first)->scratch.refused < std::numeric_limits<int>::max())
+      throw std::invalid_argument("contact " + std::to_string((*first)->scratch.refused) + ": " +
+                                  (*first)->scratch.reason);
+    for (const auto& worker : workers_)
+      if (worker->failure) std::rethrow_exception(worker->failure);
+  }
+
+  WorkerTeam team_;
+  std::vector<std::unique_ptr<Worker>> workers_;
+};
 
 // Islands from this size on are swept by all threads together, others by one thread each.
 constexpr int kTogether = 1500;
@@ -30,10 +98,12 @@ struct IslandResult {
   bool stale = false;  // velocities hold round-off of much larger impulses to start from
   // Work that a Problem of it may take: sweeps are forecast to need more, or have ended. 0: none.
   double assembly = 0;
-  double spent = 0;    // work of assemblies so far
-  bool ended = false;  // sweeps make no progress, or may not
-  bool assembled = false;
-  bool saved = false;  // an earlier point was the best and is unpacked already
+  double spent = 0;  // work of assemblies so far
+  bool assembled() const { return spent > 0; }
+  // How sweeps ended: not yet, without progress or at the limit; the best point was an earlier one,
+  // which is unpacked already.
+  enum class End { none, at_last_point, at_earlier_point } end = End::none;
+  bool saved() const { return end == End::at_earlier_point; }
 };
 
 }  // namespace tether::contact::detail

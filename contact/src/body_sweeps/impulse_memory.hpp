@@ -32,13 +32,13 @@ class ImpulseMemory {
   // Before a run of find().
   void rewind() {
     next_ = 0;
-    indexed_ = false;
+    mask_ = 0;
   }
 
   const Eigen::Vector3d* find(std::uint64_t id) {
     if (ids_.empty() || id == kNoId) return nullptr;
     if (next_ < ids_.size() && ids_[next_] == id) return &impulses_[next_++];
-    if (!indexed_) index();
+    if (mask_ == 0) index();
     for (std::size_t k = hash(id);; k = (k + 1) & mask_) {
       if (table_[k] == kEmpty) return nullptr;
       if (ids_[table_[k]] == id) {
@@ -73,14 +73,12 @@ class ImpulseMemory {
       while (table_[k] != kEmpty) k = (k + 1) & mask_;
       table_[k] = static_cast<std::uint32_t>(i);
     }
-    indexed_ = true;
   }
 
   std::vector<std::uint64_t> ids_;
   std::vector<Eigen::Vector3d> impulses_;
   std::vector<std::uint32_t> table_;
-  std::size_t next_ = 0, mask_ = 0;
-  bool indexed_ = false;
+  std::size_t next_ = 0, mask_ = 0;  // 0: not indexed
 };
 
 // The impulses of the last solve, and of the one before it, so that the last one can be taken back.

@@ -1,9 +1,11 @@
-// Tether: what the progress of sweeps tells to do next. SPDX-License-Identifier: BSD-3-Clause
+// Tether: the rules by which sweeps go on or give way. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "graph/contact_graph.hpp"
 
 namespace tether::contact::detail {
 
@@ -13,8 +15,6 @@ namespace tether::contact::detail {
 // progress, a little more change is allowed in every other window.
 class Momentum {
  public:
-  void start() { on_ = true; }
-  bool on() const { return on_; }
   // beta, given the sum of squares that the last sweep changed.
   double next(double change) {
     best_ = std::min(best_, change);
@@ -45,7 +45,6 @@ class Momentum {
     window_end_ = count_ + window_;
   }
 
-  bool on_ = false;
   double t_ = 1, last_ = kNone, allowed_ = 1, best_ = kNone, best_before_ = kNone;
   int count_ = 0, window_ = 100, window_end_ = 100;
 };
@@ -60,17 +59,17 @@ class BestPoint {
   explicit BestPoint(int max_sweeps) : max_sweeps_(max_sweeps) {}
   // residual: of a point that is saved already.
   void want(double residual = std::numeric_limits<double>::infinity()) {
-    wanted_ = true;
+    next_ = kFirst;
     residual_ = residual * residual;
   }
-  void forecast(double sweeps) { slow_ = !(sweeps <= max_sweeps_); }
+  void forecast(double sweeps) { forecast_ = sweeps; }
   // change: sum of squares that the last sweep changed.
   bool is_due(int sweeps, double change) {
     const bool rises = change > last_ && sweeps >= kLong;
     last_ = change;
-    if (!wanted_ || sweeps < next_) return false;
+    if (sweeps < next_) return false;
     if (!(change < kLess * change_) && sweeps < next_ + kOld) return false;
-    if (!rises && !slow_ && sweeps <= max_sweeps_ / 2) return false;
+    if (!rises && forecast_ <= max_sweeps_ && sweeps <= max_sweeps_ / 2) return false;
     change_ = change;
     next_ = sweeps + kApart;
     return true;
@@ -90,9 +89,8 @@ class BestPoint {
   static constexpr int kApart = 8, kLong = 256, kOld = 120;
   static constexpr double kLess = 0.64;
 
-  bool wanted_ = false, slow_ = false;
-  int max_sweeps_, next_ = kFirst;
-  double change_ = kNone, last_ = kNone, residual_ = kNone;
+  int max_sweeps_, next_ = std::numeric_limits<int>::max();  // before want(): never
+  double forecast_ = 0, change_ = kNone, last_ = kNone, residual_ = kNone;
 };
 
 // Forecasts the sweeps that are still needed, after 5, 10, 20, 40, ... sweeps, from the convergence
@@ -146,6 +144,31 @@ class Forecast {
 
   double before_ = kNone, earlier_ = kNone, least_ = kNone;
   int next_;
+};
+
+// Predicted from the graph of an island alone, in the unit of Options::max_work. The order and the
+// fill of a factorisation are looked for once, where they are asked for: that takes as long as one
+// to three sweeps, and allocates.
+class AssemblyPrice {
+ public:
+  // first, second: moving bodies of each contact, as ContactGraph::build has them.
+  AssemblyPrice(const ContactGraph& graph, const Island& island, const std::vector<int>& first,
+                const std::vector<int>& second);
+
+  // Cost of a sweep over the bodies.
+  double sweep() const { return sweep_; }
+  // Cost of a solution by few factorisations, in sweeps over the bodies.
+  double sweeps();
+  // Whether `work` suffices for the stages of Solver to get anywhere.
+  bool within(double work);
+
+ private:
+  double factorisation();
+
+  const ContactGraph& graph_;
+  const Island& island_;
+  const std::vector<int>&first_, &second_;
+  double sweep_ = 0, blocks_ = 0, factorisation_ = -1;
 };
 
 }  // namespace tether::contact::detail

@@ -78,6 +78,58 @@ void compress(std::vector<MatrixEntry>& entries) {
   entries.resize(n);
 }
 
+using Sparse = Eigen::SparseMatrix<double>;
+
+// Factors of the connected part of M that begins at `row`. One of its halves may be all that is
+// given.
+void factor_mass(const std::vector<Eigen::Triplet<double>>& entries, Eigen::Index size, int row,
+                 Eigen::SimplicialLLT<Sparse>& factor) {
+  Sparse M(size, size);
+  M.setFromTriplets(entries.begin(), entries.end());
+  const Sparse other = M.transpose(), above = M.triangularView<Eigen::StrictlyUpper>(),
+               below = M.triangularView<Eigen::StrictlyLower>();
+  bool symmetric = true;
+  if ((above.norm() == 0) != (below.norm() == 0)) {
+    M = (M + Sparse((above + below).transpose())).eval();
+  } else {
+    symmetric = (M - other).norm() <= kUnsymmetric * M.norm();
+    M = (0.5 * (M + other)).eval();
+  }
+  if (symmetric) factor.compute(M);
+  if (!symmetric || factor.info() != Eigen::Success)
+    fail("M is not symmetric and positive definite in the part of row " + std::to_string(row));
+}
+
+// A connected part of M: its rows, and the entries of M and J in them.
+struct MassPart {
+  std::vector<int> members;
+  std::vector<Eigen::Triplet<double>> mass;  // by places in the part
+  std::vector<MatrixEntry> rows;
+};
+
+std::vector<MassPart> mass_parts(const std::vector<MatrixEntry>& M,
+                                 const std::vector<MatrixEntry>& J, int n,
+                                 std::vector<int>& place) {
+  linalg::DisjointSets sets(n);
+  for (const MatrixEntry& e : M)
+    if (e.value != 0) sets.join(e.row, e.column);
+  std::vector<MassPart> out;
+  std::vector<int> part(at(n));
+  place.resize(at(n));
+  for (int i = 0; i < n; ++i) {
+    if (sets.root(i) == i) out.emplace_back();
+    part[at(i)] = sets.root(i) == i ? static_cast<int>(out.size()) - 1 : part[at(sets.root(i))];
+    std::vector<int>& members = out[at(part[at(i)])].members;
+    place[at(i)] = static_cast<int>(members.size());
+    members.push_back(i);
+  }
+  for (const MatrixEntry& e : M)
+    if (e.value != 0)
+      out[at(part[at(e.row)])].mass.emplace_back(place[at(e.row)], place[at(e.column)], e.value);
+  for (const MatrixEntry& e : J) out[at(part[at(e.column)])].rows.push_back(e);
+  return out;
+}
+
 }  // namespace
 
 namespace detail {
@@ -154,25 +206,8 @@ void require_law(const ConeProblem& problem, Law law) {
 }  // namespace detail
 
 const char* name(Cone::Kind kind) {
-  switch (kind) {
-    case Cone::Kind::free:
-      return "free";
-    case Cone::Kind::nonnegative:
-      return "nonnegative";
-    case Cone::Kind::bounded:
-      return "bounded";
-    case Cone::Kind::planar:
-      return "planar";
-    case Cone::Kind::friction:
-      return "friction";
-    case Cone::Kind::torsional:
-      return "torsional";
-    case Cone::Kind::rolling:
-      return "rolling";
-    case Cone::Kind::rolling_torsional:
-      return "rolling_torsional";
-  }
-  return "unknown";
+  return detail::text(kind, {"free", "nonnegative", "bounded", "planar", "friction", "torsional",
+                             "rolling", "rolling_torsional"});
 }
 
 ConeProblem ConeProblem::sparse(const std::vector<MatrixEntry>& A, const linalg::VectorView& b,
@@ -257,55 +292,26 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
   detail::require_finite("bias", bias);
   check_entries("M", M, n, n);
   check_entries("J", J, m, n);
-  // Connected parts of M: M is factorised part by part.
-  linalg::DisjointSets parts(n);
-  for (const MatrixEntry& e : M)
-    if (e.value != 0) parts.join(e.row, e.column);
-  std::vector<int> place(at(n)), size(at(n), 0), row_place(at(m), -1);
-  for (int i = 0; i < n; ++i) place[at(i)] = size[at(parts.root(i))]++;
-  std::vector<std::vector<Eigen::Triplet<double>>> mass(at(n));
-  std::vector<std::vector<MatrixEntry>> rows(at(n));
-  std::vector<std::vector<int>> members(at(n));
-  for (int i = 0; i < n; ++i) members[at(parts.root(i))].push_back(i);
-  for (const MatrixEntry& e : M)
-    if (e.value != 0)
-      mass[at(parts.root(e.row))].emplace_back(place[at(e.row)], place[at(e.column)], e.value);
-  for (const MatrixEntry& e : J) rows[at(parts.root(e.column))].push_back(e);
-
+  std::vector<int> place, row_place(at(m), -1);
+  const std::vector<MassPart> parts = mass_parts(M, J, n, place);
   std::vector<MatrixEntry> A;
   Eigen::VectorXd b = -bias;
-  for (int part = 0; part < n; ++part) {
-    if (size[at(part)] == 0) continue;
-    const auto refuse_part = [&] {
-      fail("M is not symmetric and positive definite in the part of row " + std::to_string(part));
-    };
-    Eigen::SparseMatrix<double> Mk(size[at(part)], size[at(part)]);
-    Mk.setFromTriplets(mass[at(part)].begin(), mass[at(part)].end());
-    const Eigen::SparseMatrix<double> other = Mk.transpose();
-    const Eigen::SparseMatrix<double> half = Mk.triangularView<Eigen::StrictlyUpper>();
-    const Eigen::SparseMatrix<double> below = Mk.triangularView<Eigen::StrictlyLower>();
-    if ((half.norm() == 0) != (below.norm() == 0)) {  // only one triangle was given
-      Mk = (Mk + Eigen::SparseMatrix<double>((half + below).transpose())).eval();
-    } else {
-      if (!((Mk - other).norm() <= kUnsymmetric * Mk.norm())) refuse_part();
-      Mk = (0.5 * (Mk + other)).eval();
-    }
-    const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor(Mk);
-    if (factor.info() != Eigen::Success) refuse_part();
+  for (const MassPart& part : parts) {
+    const auto size = static_cast<Eigen::Index>(part.members.size());
+    Eigen::SimplicialLLT<Sparse> factor;
+    factor_mass(part.mass, size, part.members.front(), factor);
     std::vector<int> touched;
-    for (const MatrixEntry& e : rows[at(part)])
+    for (const MatrixEntry& e : part.rows)
       if (row_place[at(e.row)] < 0) {
         row_place[at(e.row)] = static_cast<int>(touched.size());
         touched.push_back(e.row);
       }
     // A = E'E, E = L^-1 J' with M = L L', is symmetric to the last bit. Entries that should vanish
     // are as small as rounding.
-    Eigen::MatrixXd E =
-        Eigen::MatrixXd::Zero(size[at(part)], static_cast<Eigen::Index>(touched.size()));
-    for (const MatrixEntry& e : rows[at(part)])
-      E(place[at(e.column)], row_place[at(e.row)]) += e.value;
-    Eigen::VectorXd g(size[at(part)]);
-    for (int i : members[at(part)]) g[place[at(i)]] = f[i];
+    Eigen::MatrixXd E = Eigen::MatrixXd::Zero(size, static_cast<Eigen::Index>(touched.size()));
+    for (const MatrixEntry& e : part.rows) E(place[at(e.column)], row_place[at(e.row)]) += e.value;
+    Eigen::VectorXd g(size);
+    for (int i : part.members) g[place[at(i)]] = f[i];
     E = (factor.permutationP() * E).eval();
     g = (factor.permutationP() * g).eval();
     factor.matrixL().solveInPlace(E);

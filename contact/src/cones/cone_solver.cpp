@@ -41,6 +41,7 @@ struct ConeSolver::Implementation {
 
   ConeSolution solve(const ConeProblem& problem, const linalg::VectorView* start);
   void judge(const ConeProblem& problem, const detail::Embedding& embedding, ConeSolution& out);
+  void report(const Solution& found, ConeSolution& out) const;
 
   Options options;
   Solver solver;
@@ -57,6 +58,27 @@ void ConeSolver::Implementation::judge(const ConeProblem& problem,
     const double scale = problem.row_scale()[at(row)], w = std::abs(out.velocities[row]);
     if (scale > 0 ? w * scale > detail::kContradiction * needed : w > 0)
       out.contradicting.push_back(row);
+  }
+}
+
+// Status and advice.
+void ConeSolver::Implementation::report(const Solution& found, ConeSolution& out) const {
+  out.status = found.status;
+  out.advice = found.advice;
+  if (!out.contradicting.empty() || !out.blocked.empty()) {
+    out.status = Status::infeasible;
+    out.advice = out.contradicting.empty()
+                     ? "block " + std::to_string(out.blocked.front()) +
+                           " approaches, but free rows hold its normal: no impulse stops it"
+                     : "free row " + std::to_string(out.contradicting.front()) +
+                           " contradicts others: see `contradicting`";
+  } else if (out.error <= options.tolerance) {
+    out.status = Status::solved;
+    out.advice.clear();
+  } else if (found.status == Status::solved) {
+    out.status = Status::round_off;
+    out.advice = "the error of block " + std::to_string(out.residuals.worst) +
+                 " is round-off of its free rows: a smaller tolerance cannot be reached";
   }
 }
 
@@ -97,23 +119,7 @@ ConeSolution ConeSolver::Implementation::solve(const ConeProblem& problem,
   }
   for (int contact : found.replaced) out.replaced.push_back(embedding.block_of(contact));
   out.blocked = embedding.blocked();
-  out.status = found.status;
-  out.advice = found.advice;
-  if (!out.contradicting.empty() || !out.blocked.empty()) {
-    out.status = Status::infeasible;
-    out.advice = out.contradicting.empty()
-                     ? "block " + std::to_string(out.blocked.front()) +
-                           " approaches, but free rows hold its normal: no impulse stops it"
-                     : "free row " + std::to_string(out.contradicting.front()) +
-                           " contradicts others: see `contradicting`";
-  } else if (out.error <= options.tolerance) {
-    out.status = Status::solved;
-    out.advice.clear();
-  } else if (found.status == Status::solved) {
-    out.status = Status::round_off;
-    out.advice = "the error of block " + std::to_string(out.residuals.worst) +
-                 " is round-off of its free rows: a smaller tolerance cannot be reached";
-  }
+  report(found, out);
   if (found.status == Status::infeasible && !found.infeasible_direction.empty()) {
     const auto n = static_cast<Eigen::Index>(found.infeasible_direction.size());
     const Eigen::VectorXd d = embedding.complete(

@@ -141,12 +141,9 @@ void Embedding::clear_held(const ConeProblem& problem) {
       for (int r = 0; r < count; ++r)
         for (int c = 0; c < count; ++c) Q.emplace_back(from + r, from + c, -d[r] * d[c]);
       any = true;
-      double slip = 0, of = 0;
-      for (int r = 0; r < count; ++r) {
-        slip += d[r] * b_[from + r];
-        of = std::max(of, need_);
-      }
-      if (std::abs(slip) <= kSlip * of)
+      double slip = 0;
+      for (int r = 0; r < count; ++r) slip += d[r] * b_[from + r];
+      if (std::abs(slip) <= kSlip * need_)
         for (int r = 0; r < count; ++r) b_[from + r] -= slip * d[r];
     }
   };

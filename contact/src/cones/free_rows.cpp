@@ -1,5 +1,5 @@
 // Tether: the free rows of a problem over cones. SPDX-License-Identifier: BSD-3-Clause
-#include "cones/free_rows.hpp"
+#include "cones/embedding.hpp"
 
 #include <cmath>
 #include <limits>

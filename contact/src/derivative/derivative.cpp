@@ -152,7 +152,7 @@ void detail::DerivativeParts::check(const ProblemDirection& direction) const {
 }
 
 const char* name(DerivativeStatus status) {
-  return status == DerivativeStatus::unique ? "unique" : "minimum_norm";
+  return detail::text(status, {"unique", "minimum_norm"});
 }
 
 const DerivativeReport& Derivative::report() const { return parts_->report; }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tether/linalg/disjoint_sets.hpp>
 
 #include "problem/refuse.hpp"
 
@@ -84,7 +85,7 @@ void SolutionDerivative::linearise(const DerivativeOptions& options) {
   const double kink = std::max(options.kink, 10 * report_.error);
   place_.assign(at(n), -1);
   Packed w(at(n));
-  system_.exact_velocities(x_.data(), w.data());
+  velocities(system_.problem(), true, x_.data(), w.data());
   for (int i = 0; i < n; ++i) {
     LawTangent t;
     system_.tangent(i, x_[at(i)], w[at(i)], t);
@@ -117,32 +118,28 @@ void SolutionDerivative::linearise(const DerivativeOptions& options) {
 // Touching contacts that blocks of A connect.
 void SolutionDerivative::collect_islands() {
   const Problem& p = system_.problem();
-  std::vector<int> local(at(p.contacts()), -1);
-  for (int seed = 0; seed < p.contacts(); ++seed) {
-    if (place_[at(seed)] < 0 || local[at(seed)] >= 0) continue;
-    auto island = std::make_unique<IslandEquations>();
-    const auto reach = [&](int i) {
-      if (place_[at(i)] < 0 || local[at(i)] >= 0) return;
-      local[at(i)] = 0;
-      island->contacts.push_back(i);
-    };
-    reach(seed);
-    for (std::size_t next = 0; next < island->contacts.size(); ++next) {
-      const int i = island->contacts[next];
-      for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k)
-        reach(p.columns()[at(k)]);
-    }
-    std::sort(island->contacts.begin(), island->contacts.end());
-    for (int i = 0; i < island->size(); ++i) local[at(island->contacts[at(i)])] = i;
+  const int n = p.contacts();
+  const auto each_neighbour = [&](int i, const auto& visit) {
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k)
+      if (place_[at(p.columns()[at(k)])] >= 0) visit(p.columns()[at(k)]);
+  };
+  linalg::DisjointSets sets(n);
+  for (int i = 0; i < n; ++i)
+    if (place_[at(i)] >= 0) each_neighbour(i, [&](int j) { sets.join(i, j); });
+  std::vector<IslandEquations*> of(at(n));  // of roots, which precede the others
+  std::vector<int> local(at(n));
+  for (int i = 0; i < n; ++i) {
+    if (place_[at(i)] < 0) continue;
+    IslandEquations*& island = of[at(sets.root(i))];
+    if (!island) island = islands_.emplace_back(std::make_unique<IslandEquations>()).get();
+    local[at(i)] = island->size();
+    island->contacts.push_back(i);
+  }
+  for (const auto& island : islands_)
     for (int i : island->contacts) {
-      for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-        const int j = p.columns()[at(k)];
-        if (place_[at(j)] >= 0) island->columns.push_back(local[at(j)]);
-      }
+      each_neighbour(i, [&](int j) { island->columns.push_back(local[at(j)]); });
       island->starts.push_back(static_cast<int>(island->columns.size()));
     }
-    islands_.push_back(std::move(island));
-  }
 }
 
 // M_ij = P_i delta_ij + Q_i A_ij, A scaled to unit traces.

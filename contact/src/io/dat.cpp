@@ -1,33 +1,161 @@
 // Tether: the Siconos .dat format. SPDX-License-Identifier: BSD-3-Clause
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <locale>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "io/file_problem.hpp"
+
+namespace tether::contact::detail {
+
+constexpr std::size_t kMostOfPipe = std::size_t{1} << 30;
+
+class Tokens {
+ public:
+  explicit Tokens(const std::string& path) : path_(path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error(path + ": cannot be opened");
+    // Pipes and devices may never end: they are read up to a limit, and not beyond binary data.
+    std::error_code ignored;
+    const bool regular = std::filesystem::is_regular_file(path, ignored);
+    std::vector<char> part(1 << 16);
+    while (file.read(part.data(), static_cast<std::streamsize>(part.size())), file.gcount() > 0) {
+      const auto count = static_cast<std::size_t>(file.gcount());
+      text_.append(part.data(), count);
+      if (std::memchr(part.data(), '\0', count) != nullptr) break;
+      if (!regular && text_.size() > kMostOfPipe) {
+        fail("oversized: more than " + std::to_string(kMostOfPipe) +
+             " bytes, and not a regular file");
+      }
+    }
+    if (file.bad()) fail("cannot be read");
+    at_ = text_.data();
+    end_ = at_ + text_.size();
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw std::runtime_error(path_ + ": " + what);
+  }
+
+  bool empty() {
+    skip();
+    return at_ == end_;
+  }
+  long integer(const char* what, long least, long most) {
+    const double value = number(what);
+    if (!(value >= static_cast<double>(least) && value <= static_cast<double>(most)) ||
+        value != std::floor(value)) {
+      std::ostringstream text;
+      text.imbue(std::locale::classic());
+      text << what << " is " << value << "; an integer from " << least << " to " << most
+           << " is expected";
+      fail(text.str());
+    }
+    return static_cast<long>(value);
+  }
+  double finite(const char* what) {
+    const double value = number(what);
+    if (!std::isfinite(value)) fail(std::string(what) + " has an entry that is not finite");
+    return value;
+  }
+  long left() const { return static_cast<long>(end_ - at_); }
+  /// Words from here to the end.
+  long words_left() const {
+    long count = 0;
+    bool inside = false;
+    for (const char* c = at_; c != end_; ++c) {
+      const bool in = !separates(*c);
+      count += in && !inside;
+      inside = in;
+    }
+    return count;
+  }
+  /// The next line that is not empty, without white space before it; for a few hundred bytes.
+  std::string line(const char* what) {
+    skip();
+    if (at_ == end_) fail(std::string("truncated: the file ends in ") + what);
+    const char* stop = at_;
+    while (stop != end_ && *stop != '\n' && stop - at_ < 400) ++stop;
+    std::string out(at_, stop);
+    at_ = stop;
+    return out;
+  }
+  /// A character that must come next, white space before it.
+  void expect(char c, const char* what) {
+    skip();
+    if (at_ == end_ || *at_ != c) fail(std::string("'") + c + "' is expected in " + what);
+    ++at_;
+  }
+
+ private:
+  void skip() {
+    while (at_ != end_ && (*at_ == ' ' || *at_ == '\n' || *at_ == '\t' || *at_ == '\r')) ++at_;
+  }
+  // Independent of the locale that the host has set.
+  double number(const char* what) {
+    skip();
+    if (at_ == end_) fail(std::string("truncated: the file ends in ") + what);
+    if (*at_ == '\0') fail(std::string("binary data in ") + what);
+    const char* begin = *at_ == '+' && at_ + 1 != end_ && at_[1] != '-' ? at_ + 1 : at_;
+    double value = 0;
+    const auto [stop, error] = std::from_chars(begin, end_, value);
+    if (error == std::errc::result_out_of_range) {
+      fail(std::string("out of the range of double precision in ") + what + ": '" + word(at_) +
+           "'");
+    }
+    if (error != std::errc() || (stop != end_ && !separates(*stop))) {
+      fail(std::string("not a number in ") + what + ": '" + word(at_) + "'");
+    }
+    at_ = stop;
+    return value;
+  }
+  static bool separates(char c) {
+    return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\0';
+  }
+  // Without what a terminal would obey: of ASCII, and a question mark for the rest.
+  std::string word(const char* begin) const {
+    std::string out;
+    for (const char* c = begin; c != end_ && out.size() < 20 && !separates(*c); ++c)
+      out += *c > ' ' && *c < 0x7f ? *c : '?';
+    return out;
+  }
+
+  std::string path_, text_;
+  const char *at_ = nullptr, *end_ = nullptr;
+};
+
+}  // namespace tether::contact::detail
+
 //
 // dimension (2, 3; 5: with rolling), number of contacts, a matrix; then
 //   local:  q, mu (, mu_r)         w = M x + q
 //   global: H, q, b, mu (, mu_r)   M v = H x + q, w = H'v + b
-#include <charconv>
-#include <cstdio>
-#include <limits>
-
-#include "io/dat_tokens.hpp"
-#include "io/file_problem.hpp"
 
 namespace tether::contact::detail {
 
 namespace {
 
 constexpr long kMost = std::numeric_limits<int>::max();
-// Words that the shortest entry takes, and the white space between them: what is left of the file
-// bounds what it may claim.
-constexpr long kNumber = 2, kTriplet = 8, kColumn = 6;
-
-void claim(Tokens& in, long count, long bytes) {
-  if (count > in.left() / bytes + 1) in.fail("truncated: the file ends in the matrix");
+// The rest of the file bounds the entries that it may claim: the shortest takes two bytes.
+void claim(Tokens& in, long count, long each = 1) {
+  constexpr long kNumber = 2;
+  if (count > in.left() / (kNumber * each) + 1) in.fail("truncated: the file ends in the matrix");
 }
 
 std::vector<MatrixEntry> read_dense(Tokens& in, long rows, long columns) {
   if (in.integer("matrix rows", 0, kMost) != rows ||
       in.integer("matrix columns", 0, kMost) != columns)
     in.fail("matrix sizes do not match");
-  if (rows > 0) claim(in, columns, kNumber * rows);
+  if (rows > 0) claim(in, columns, rows);
   std::vector<MatrixEntry> out;
   for (long c = 0; c < columns; ++c)
     for (long r = 0; r < rows; ++r)
@@ -40,7 +168,7 @@ std::vector<MatrixEntry> read_blocks(Tokens& in, long rows, long columns) {
   const long count = in.integer("number of blocks", 0, kMost);
   const long sides[2] = {in.integer("block rows", 0, rows),
                          in.integer("block columns", 0, columns)};
-  claim(in, sides[0] + sides[1] + count, kNumber);
+  claim(in, sides[0] + sides[1] + count);
   std::vector<long> end[2];
   for (int side = 0; side < 2; ++side) {
     const char* what = side == 0 ? "row ends" : "column ends";
@@ -89,7 +217,7 @@ std::vector<MatrixEntry> read_sparse(Tokens& in, long rows, long columns) {
   if (std::sscanf(head.c_str(), form, &m, &n, &most, &count) != 4 || m != rows || n != columns ||
       count < 0)
     in.fail("the head of the sparse matrix does not match it");
-  claim(in, count, origin == triplets_first ? kTriplet : kColumn);
+  claim(in, count);
   std::vector<MatrixEntry> out;
   const auto row = [&] { return static_cast<int>(in.integer("row", 0, rows - 1)); };
   if (origin == triplets_first) {

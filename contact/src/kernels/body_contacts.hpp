@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <tether/contact/one_contact.hpp>
-
 #include <tether/linalg/vector_code.hpp>
 
 // Vector code for four contacts at a time, chosen when the program runs. -DTETHER_GROUPS=0: none.
+
 #ifndef TETHER_GROUPS
 #if defined(__GNUC__) && defined(__x86_64__)
 #define TETHER_GROUPS 1
@@ -93,4 +93,30 @@ TETHER_INLINE void cross(const double* a, const double* b, double* c) {
   c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+namespace {
+
+// Bodies of a contact to come; the contacts themselves are read in order.
+constexpr int kAhead = 4;
+
+template <class Contact>
+TETHER_INLINE void fetch(const BodyArrays& s, const Contact* c, const Contact* end) {
+#if defined(__GNUC__)
+  if (c + kAhead >= end) return;
+  __builtin_prefetch(s.state + c[kAhead].first, 1);
+  __builtin_prefetch(s.state + (c[kAhead].second < 0 ? 0 : c[kAhead].second), 1);
+#endif
+}
+
+template <class Contact>
+TETHER_INLINE const BodyState& second(const BodyArrays& s, const Contact& c) {
+  return *(c.second < 0 ? s.fixed - 1 - c.second : s.state + c.second);
+}
+
+TETHER_INLINE void add(Squares& sum, double square, double share) {
+  square /= share * share;
+  sum.sum += square;
+  sum.most = square > sum.most ? square : sum.most;
+}
+
+}  // namespace
 }  // namespace tether::contact::detail

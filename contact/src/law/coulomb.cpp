@@ -1,12 +1,77 @@
 // Tether: Coulomb's law: all of its solutions, and kernels. SPDX-License-Identifier: BSD-3-Clause
+
 #include "law/coulomb.hpp"
 
 #include <algorithm>
 #include <limits>
 
-#include "law/coulomb_lanes.hpp"
 #include "law/interface/real.hpp"
 #include "law/kernels/define_law.hpp"
+#include "law/kernels/group_pass.hpp"
+
+#if TETHER_GROUPS
+
+namespace tether::contact::detail::avx2 {
+namespace {
+
+#define TETHER_TEXT TETHER_AVX2
+#include "law/coulomb_slip.hpp"
+#undef TETHER_TEXT
+
+struct CoulombLanes {
+  // Several solutions are possible: also a stick or a jam at b_n <= 0.
+  TETHER_AVX2 v4 rare(const LaneBlocks& L, v4 h0, v4 h1, v4 touching) {
+    const v4 many = less(all(Coulomb::kManyBranches * Coulomb::kManyBranches), L.ee);
+    const v4 mixed = either(less(L.g0 * h0, all(0)), less(L.g1 * h1, all(0)));
+    return both(both(many, mixed), either(touching, at_most(all(1), L.ee)));
+  }
+
+  TETHER_AVX2 Sliding slide(const LaneBlocks& L, v4 bn, v4 k, v4 h0, v4 h1, v4, v4, v4, v4, v4,
+                            v4 lambda, v4 wanted) {
+    const v4 zero = all(0);
+    // A tenth of the range in which several solutions may exist is left to the whole law.
+    v4 rare = both(less(all(Coulomb::kManyBranches * Coulomb::kManyBranches), L.ee),
+                   either(less(L.g0 * h0, zero), less(L.g1 * h1, zero)));
+    const v4 h = root(h0 * h0 + h1 * h1), e = root(L.ee);
+    const v4 beta_min = least(L.beta0, L.beta1), beta_max = most(L.beta0, L.beta1);
+    const v4 grazing = at_most(all(1e60) * beta_max * k, h);
+    k = choose(grazing, all(1), k);
+    const v4 ik = all(1) / k;
+    rare = either(rare, grazing);
+    wanted = without(wanted, rare);
+    auto [lo, hi] = slip_bracket(e, h, ik, beta_min, beta_max);
+    const v4 gh = L.g0 * h0 + L.g1 * h1;
+    const v4 mean = (L.beta0 * h0 * h0 + L.beta1 * h1 * h1) / most(h * h, all(1e-300));
+    const v4 guess = least(most((h + gh) * ik - mean, lo), hi);
+    v4 l = choose(both(less(lo, lambda), less(lambda, hi)), lambda, guess);
+    const v4 stop = choose(less(beta_max, all(1e3) * beta_min), all(3e-8), all(1e-12));
+    v4 active = wanted;
+    for (int n = 0; n < kMaxEvaluations; ++n) {
+      const SlipEquation f = slip_equation(l, k, L.beta0, L.beta1, L.g0, L.g1, h0, h1, gh);
+      const v4 above = less(zero, f.excess), rising = less(zero, k * f.slope);
+      const v4 step = f.excess * f.q * f.z / or_one(rising, k * f.slope);
+      lo = choose(above, l, lo);
+      hi = choose(above, hi, l);
+      v4 next = l + step;
+      const v4 small = both(at_most(size(step), stop * (l + beta_min)), rising);
+      const v4 inside = both(both(less(lo, next), less(next, hi)), rising);
+      next = choose(small, least(most(next, lo), hi), choose(inside, next, 0.5 * (lo + hi)));
+      const v4 done = either(small, either(_mm256_cmp_pd(next, l, _CMP_EQ_OQ),
+                                           at_most(hi - lo, all(1e-16) * (hi + beta_min))));
+      l = choose(active, next, l);
+      active = without(active, done);
+      if (!lanes(active)) break;
+    }
+    const v4 z0 = h0 * (L.beta1 + l), z1 = h1 * (L.beta0 + l), z = root(z0 * z0 + z1 * z1);
+    const v4 f = bn * L.inv_a / (z + L.g0 * z0 + L.g1 * z1), fm = f * L.mu;
+    return {f * z, fm * z0, fm * z1, l, rare};
+  }
+};
+
+}  // namespace
+}  // namespace tether::contact::detail::avx2
+
+#endif
 
 namespace tether::contact::detail {
 
@@ -138,6 +203,58 @@ bool Coulomb::safeguarded(const LocalBlock& L, const LocalRhs& r, double warm, d
 
 namespace {
 
+// visit(lambda) for the zeros of f beyond 0, and maybe for points that are none; e: at 0.
+template <class Visit>
+void each_zero(Secular& e, const LocalBlock& L, const LocalRhs& r, double least, bool static_,
+               const Visit& slides) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double rise = e.slope;
+  // End of the concave part, |z|^3 = d^2 / 2k. At k <= 0 there is no other.
+  double bend = infinity;
+  if (r.k > 0) {
+    const double t = std::cbrt(e.dd / (2 * r.k)), c = t * t - e.ss;
+    bend = c > 0 ? c / (e.sh + std::sqrt(e.sh * e.sh + e.hh * c)) : 0;
+  }
+  // Beyond this f > 0 (k > 0) or f < 0 (k < 0).
+  const double h = std::sqrt(e.hh), far = std::max(0.0, (1 + L.e) * h / std::abs(r.k) - least);
+  bool positive_at_bend = !static_;
+  if (bend > 0) {
+    const double end = bend < infinity  ? bend
+                       : far < infinity ? 2 * far + least
+                                        : 1e15 * (e.sum + 1);  // k = 0: straight in the end
+    e.at(end);
+    positive_at_bend = e.f >= 0;
+    if (static_ && !positive_at_bend) {
+      slides(e.zero(end, least));
+    } else if (!static_ && positive_at_bend) {
+      slides(e.zero(0, least));
+    } else if (!static_ && rise > 0 && e.slope < 0) {
+      const double top = e.turn(0, least, 1);
+      e.at(top);
+      if (e.f >= 0) {
+        slides(e.zero(0, least));
+        slides(e.zero(end, least));
+      }
+    }
+  } else {
+    positive_at_bend = static_;
+  }
+  if (bend < infinity) {
+    e.at(bend);
+    const double fall = e.slope, from = std::max(far, bend);
+    if (!positive_at_bend) {
+      slides(e.zero(from + least, least));
+    } else if (fall < 0) {
+      const double bottom = e.turn(from + least, least, -1);
+      e.at(bottom);
+      if (e.f <= 0) {
+        slides(e.zero(bend, least));
+        slides(e.zero(from + least, least));
+      }
+    }
+  }
+}
+
 Regime nearest_ordinary(const LocalBlock& L, const LocalRhs& r, double bn, double* x,
                         double& lambda, int& evaluations) {
   double best[3] = {0, 0, 0}, distance = -1, best_lambda = lambda;
@@ -161,65 +278,13 @@ Regime nearest_ordinary(const LocalBlock& L, const LocalRhs& r, double bn, doubl
   };
   Secular e(L, r);
   const double least = std::min(L.beta[0], L.beta[1]);
-  const double infinity = std::numeric_limits<double>::infinity();
   e.at(0);
   const bool static_ = sticks(L, r, e.s0, e.s1, e.length);
   if (static_) {
     stick(L, r, bn, z);
     offer(z, Regime::sticking, lambda);
   }
-  if (e.hh > 0) {
-    const double rise = e.slope;
-    // End of the concave part, |z|^3 = d^2 / 2k. At k <= 0 there is no other.
-    double bend = infinity;
-    if (r.k > 0) {
-      const double t = std::cbrt(e.dd / (2 * r.k)), c = t * t - e.ss;
-      bend = c > 0 ? c / (e.sh + std::sqrt(e.sh * e.sh + e.hh * c)) : 0;
-    }
-    // Beyond this f > 0 (k > 0) or f < 0 (k < 0).
-    const double h = std::sqrt(e.hh), far = std::max(0.0, (1 + L.e) * h / std::abs(r.k) - least);
-    const bool limit = far < infinity;  // k = 0: straight lines in the end
-    bool positive_at_bend = !static_;
-    if (bend > 0) {
-      double end = bend;
-      if (bend < infinity) {
-        e.at(bend);
-        positive_at_bend = e.f >= 0;
-      } else {
-        end = limit ? 2 * far + least : 1e15 * (e.sum + 1);
-        e.at(end);
-        positive_at_bend = e.f >= 0;
-      }
-      if (static_ && !positive_at_bend) {
-        slides(e.zero(end, least));
-      } else if (!static_ && positive_at_bend) {
-        slides(e.zero(0, least));
-      } else if (!static_ && rise > 0 && e.slope < 0) {
-        const double top = e.turn(0, least, 1);
-        e.at(top);
-        if (e.f >= 0) {
-          slides(e.zero(0, least));
-          slides(e.zero(end, least));
-        }
-      }
-    } else {
-      positive_at_bend = static_;
-    }
-    if (bend < infinity) {
-      e.at(bend);
-      const double fall = e.slope, from = std::max(far, bend);
-      if (!positive_at_bend) {
-        slides(e.zero(from + least, least));
-      } else if (fall < 0) {
-        const double bottom = e.turn(from + least, least, -1);
-        e.at(bottom);
-        if (e.f <= 0) {
-          slides(e.zero(bend, least));
-          slides(e.zero(from + least, least));
-        }
-      }
-    }
-  }
+  if (e.hh > 0) each_zero(e, L, r, least, static_, slides);
   evaluations += e.evaluations;
   std::copy(best, best + 3, x);
   lambda = best_lambda;

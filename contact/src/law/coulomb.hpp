@@ -1,7 +1,6 @@
 // Tether: the classical Coulomb law for one contact. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 #include <tether/linalg/friction_cone.hpp>
 

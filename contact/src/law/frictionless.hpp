@@ -1,7 +1,6 @@
 // Tether: contact without friction. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 
 namespace tether::contact::detail {

@@ -4,7 +4,6 @@
 
 #include <limits>
 
-#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 #include "law/interface/real.hpp"
 #include <tether/linalg/friction_cone.hpp>

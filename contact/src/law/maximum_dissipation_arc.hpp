@@ -15,6 +15,28 @@ struct Arc {
   Mask inverted, wide;  // wide: the arc goes beyond 90 degrees
 };
 
+// lo, hi and t of an arc that ends at `far`, to be begun at t; the quartic is inverted where its
+// root is beyond 90 degrees.
+TETHER_TEXT void set_bracket(Arc& a, Real far, Real t, Mask wanted) {
+  const Real zero = all(0), one = all(1);
+  a.wide = less(one, far);
+  a.inverted = both(a.wide, less(a.q0 + a.q1 + a.q2 + a.q3 + a.q4, zero));
+  a.lo = zero;
+  a.hi = least(far, one);
+  if (lanes(both(a.inverted, wanted))) {
+    const Real r0 = a.q0, r1 = a.q1;
+    a.q0 = choose(a.inverted, -a.q4, a.q0);
+    a.q1 = choose(a.inverted, -a.q3, a.q1);
+    a.q2 = choose(a.inverted, -a.q2, a.q2);
+    a.q3 = choose(a.inverted, -r1, a.q3);
+    a.q4 = choose(a.inverted, -r0, a.q4);
+    a.lo = choose(a.inverted, one / most(far, one), a.lo);
+    a.hi = choose(a.inverted, one, a.hi);
+    t = choose(a.inverted, choose(less(zero, t), one / most(t, all(1e-300)), one), t);
+  }
+  a.t = least(most(t, a.lo), a.hi);
+}
+
 // In the frame in which the tangential block is diag(beta). s = |B| y*, length = |s|, open: e >= 1,
 // w: the present tangential impulse. Lanes that are not wanted hold anything.
 TETHER_TEXT Arc visible_arc(Real k, Real beta0, Real beta1, Real f0, Real f1, Real h0, Real h1,
@@ -61,22 +83,6 @@ TETHER_TEXT Arc visible_arc(Real k, Real beta0, Real beta1, Real f0, Real f1, Re
   const Mask ahead = less(all(1e-12) * w, down);
   Real t = zero;
   if (lanes(ahead)) t = choose(ahead, side * (u0 * w1 - u1 * w0) / or_one(ahead, down), zero);
-  a.wide = less(one, far);
-  a.inverted = both(a.wide, less(q0 + q1 + q2 + q3 + q4, zero));
-  a.lo = zero;
-  a.hi = least(far, one);
-  if (lanes(both(a.inverted, wanted))) {
-    const Real r0 = q0, r1 = q1;
-    q0 = choose(a.inverted, -q4, q0);
-    q1 = choose(a.inverted, -q3, q1);
-    q2 = choose(a.inverted, -q2, q2);
-    q3 = choose(a.inverted, -r1, q3);
-    q4 = choose(a.inverted, -r0, q4);
-    a.lo = choose(a.inverted, one / most(far, one), a.lo);
-    a.hi = choose(a.inverted, one, a.hi);
-    t = choose(a.inverted, choose(less(zero, t), one / most(t, all(1e-300)), one), t);
-  }
-  a.t = least(most(t, a.lo), a.hi);
   a.u0 = u0;
   a.u1 = u1;
   a.q0 = q0;
@@ -85,6 +91,7 @@ TETHER_TEXT Arc visible_arc(Real k, Real beta0, Real beta1, Real f0, Real f1, Re
   a.q3 = q3;
   a.q4 = q4;
   a.side = side;
+  set_bracket(a, far, t, wanted);
   return a;
 }
 

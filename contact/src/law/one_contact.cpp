@@ -10,15 +10,7 @@
 namespace tether::contact {
 
 const char* name(Regime regime) {
-  switch (regime) {
-    case Regime::separating:
-      return "separating";
-    case Regime::sticking:
-      return "sticking";
-    case Regime::sliding:
-      return "sliding";
-  }
-  return "?";
+  return detail::text(regime, {"separating", "sticking", "sliding"});
 }
 
 LocalBlock::LocalBlock(const Eigen::Matrix3d& A, double friction) {

@@ -1,11 +1,11 @@
-// Tether: the factors of a Delassus matrix that bodies have given. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: factors of a Delassus matrix by bodies. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <Eigen/Cholesky>
 #include <map>
 #include <memory>
 #include <tether/contact/bodies.hpp>
+#include <tether/contact/problem.hpp>
 #include <tether/linalg/block3.hpp>
 #include <tether/linalg/index.hpp>
 #include <tether/linalg/symmetric_eigen.hpp>
@@ -61,5 +61,19 @@ inline std::shared_ptr<const BodyForm> part_of(const BodyForm& whole,
   out->nodes = static_cast<int>(number.size());
   return out;
 }
+
+/// Whether factors by bodies may be smaller than A: its contacts are twice as many as the pairs of
+/// bodies that touch. In the plane, where a contact has a velocity of its own, they are not.
+bool may_have_bodies(const Problem& problem);
+
+/// Factors A = H H' of a problem that is given by its matrix alone, with a few columns for each
+/// body; null where A is not positive semidefinite.
+///
+/// Contacts between the same two bodies have the same column pattern: they are a class. Two bodies
+/// have six relative velocities, so that a few rows of a class determine the others. On these rows
+/// a block Cholesky decomposition eliminates one class after another. A class that alone couples a
+/// body to what has gone before, as contacts with the ground do at first, takes the whole body
+/// away, and nothing fills in.
+std::shared_ptr<const BodyForm> bodies_of_matrix(const Problem& problem);
 
 }  // namespace tether::contact::detail

@@ -1,13 +1,26 @@
-// Tether: when a contact problem counts as solved: a criterion without units (method, eq. 15).
+// Tether: units of a problem, and when it counts as solved (method, eq. 15).
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <cmath>
 #include <limits>
-
+#include <tether/contact/one_contact.hpp>
 #include <tether/linalg/vector_code.hpp>
 
 namespace tether::contact::detail {
+
+// Between these nothing that a solve multiplies leaves the range of doubles: powers of A and b up
+// to the eighth (law/coulomb.hpp), a grazing b_n aside.
+constexpr double kLeastOrdinary = 0x1p-30, kMostOrdinary = 0x1p30;
+
+// The block in other units: A times 2^p, exactly.
+inline LocalBlock rescaled(LocalBlock L, int p) {
+  for (double* v : {&L.a, &L.c[0], &L.c[1], &L.beta[0], &L.beta[1], &L.T[0], &L.T[1], &L.T[2]})
+    *v = std::ldexp(*v, p);
+  L.inv_a = std::ldexp(L.inv_a, -p);
+  L.ordinary = true;
+  return L;
+}
 
 constexpr double kRoundOff = 0.5 * std::numeric_limits<double>::epsilon();
 // Error by double sums and block solutions, in units of the error that the round-off of x alone

@@ -1,5 +1,5 @@
 // Tether: the bodies behind a Delassus matrix. SPDX-License-Identifier: BSD-3-Clause
-#include "problem/matrix_bodies.hpp"
+#include "problem/body_form.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>

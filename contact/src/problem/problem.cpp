@@ -10,8 +10,8 @@
 #include <tether/linalg/index.hpp>
 #include <tuple>
 
-#include "problem/block_units.hpp"
 #include "problem/body_form.hpp"
+#include "problem/criterion.hpp"
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
@@ -49,10 +49,6 @@ std::vector<int> find_islands(int n, const std::vector<int>& row_start,
   return island;
 }
 
-}  // namespace
-
-namespace {
-
 constexpr std::size_t kZero = std::numeric_limits<std::size_t>::max();
 
 /// Place of a block; kZero: the block is zero, but the pattern has the place.
@@ -79,6 +75,27 @@ std::vector<Position> positions(const std::vector<MatrixBlock>& blocks, int n) {
   return out;
 }
 
+void check(const std::vector<MatrixBlock>& blocks, int n, int d) {
+  for (const MatrixBlock& block : blocks) {
+    const auto name = [&] {
+      return "block (" + std::to_string(block.row) + ", " + std::to_string(block.column) + "): ";
+    };
+    if (block.row < 0 || block.row >= n || block.column < 0 || block.column >= n)
+      throw std::invalid_argument(name() + "row and column must lie in 0 .. " +
+                                  std::to_string(n - 1));
+    if (!block.value.topLeftCorner(d, d).allFinite())
+      detail::require_finite("A", block.value.topLeftCorner(d, d), name());
+  }
+}
+
+LocalBlock local_block(int contact, const Eigen::Matrix3d& A, double mu) {
+  try {
+    return {A, mu};
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument("contact " + std::to_string(contact) + ": " + e.what());
+  }
+}
+
 }  // namespace
 
 Problem Problem::dense(const linalg::MatrixView& A, const linalg::VectorView& b,
@@ -91,23 +108,14 @@ Problem Problem::dense(const linalg::MatrixView& A, const linalg::VectorView& b,
                                 ", as b has " + size + " entries");
   }
   detail::require_finite("A", A);
-  const auto has_block = [&](int i, int j) {
-    return i == j || !(A.block(d * i, d * j, d, d).array() == 0).all();
-  };
-  std::size_t count = 0;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) count += has_block(i, j) ? 1 : 0;
   std::vector<MatrixBlock> blocks;
-  blocks.reserve(count);
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) {
-      if (!has_block(i, j)) continue;
       const auto part = A.block(d * i, d * j, d, d);
-      MatrixBlock block{i, j, Eigen::Matrix3d::Zero()};
-      block.value.topLeftCorner(d, d) = part;
-      blocks.push_back(block);
+      if (i != j && (part.array() == 0).all()) continue;
+      blocks.push_back({i, j, Eigen::Matrix3d::Zero()});
+      blocks.back().value.topLeftCorner(d, d) = part;
     }
-  }
   return sparse(d, std::move(blocks), b, mu);
 }
 
@@ -123,20 +131,7 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const li
         std::to_string(d) + " for each of " + std::to_string(n) + " friction coefficients mu");
   }
   detail::require_finite("b", b);
-  const std::size_t given = blocks.size();
-  for (std::size_t k = 0; k < given; ++k) {
-    const MatrixBlock& block = blocks[k];
-    if (block.row < 0 || block.row >= n || block.column < 0 || block.column >= n) {
-      throw std::invalid_argument("block (" + std::to_string(block.row) + ", " +
-                                  std::to_string(block.column) +
-                                  "): row and column must lie in 0 .. " + std::to_string(n - 1));
-    }
-    if (!block.value.topLeftCorner(d, d).allFinite()) {
-      detail::require_finite(
-          "A", block.value.topLeftCorner(d, d),
-          "block (" + std::to_string(block.row) + ", " + std::to_string(block.column) + "): ");
-    }
-  }
+  check(blocks, n, d);
   const std::vector<Position> order = positions(blocks, n);
 
   Problem out;
@@ -169,13 +164,7 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const li
     out.columns_.push_back(column);
     out.blocks_.push_back(packed);
     ++out.row_start_[at(row + 1)];
-    if (row == column) {
-      try {
-        out.local_.emplace_back(sum, mu[row]);
-      } catch (const std::invalid_argument& e) {
-        throw std::invalid_argument("contact " + std::to_string(row) + ": " + e.what());
-      }
-    }
+    if (row == column) out.local_.push_back(local_block(row, sum, mu[row]));
   }
   for (int i = 0; i < n; ++i) out.row_start_[at(i + 1)] += out.row_start_[at(i)];
   out.islands_ = find_islands(n, out.row_start_, out.columns_, out.blocks_);

@@ -18,6 +18,12 @@ std::string shown(double value);
 [[noreturn]] void refuse_size(const std::string& argument, Eigen::Index entries,
                               Eigen::Index needed, const std::string& why);
 
+// The enumerator as text, by a list of all.
+template <class Enum, std::size_t n>
+const char* text(Enum value, const char* const (&names)[n]) {
+  return static_cast<std::size_t>(value) < n ? names[static_cast<std::size_t>(value)] : "?";
+}
+
 inline void require(bool holds, const char* argument, double value, const char* wanted) {
   if (!holds) refuse(argument, value, wanted);
 }

@@ -7,7 +7,7 @@
 #include <tether/contact/solver.hpp>
 
 #include "problem/refuse.hpp"
-#include "proof/regime_proof.hpp"
+#include "proof/regime_equations.hpp"
 
 namespace tether::contact {
 namespace detail {
@@ -131,15 +131,7 @@ bool arithmetic_is_ieee() {
 }  // namespace detail
 
 const char* name(ProofStatus status) {
-  switch (status) {
-    case ProofStatus::proven:
-      return "proven";
-    case ProofStatus::proven_nearby:
-      return "proven_nearby";
-    case ProofStatus::not_proven:
-      break;
-  }
-  return "not_proven";
+  return detail::text(status, {"not_proven", "proven_nearby", "proven"});
 }
 
 Proof prove(const Problem& problem, const linalg::VectorView& impulses, double allowed) {

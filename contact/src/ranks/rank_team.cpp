@@ -29,52 +29,37 @@ constexpr int kPlaces = 20;  // parts are cut anew at every so many of them
 constexpr int kReport = 6, kOfContact = 5;
 constexpr int kOfBody = Vector6d::SizeAtCompileTime, kOfState = Eigen::Vector4d::SizeAtCompileTime;
 
-// Bodies of a list to ranks first .. first + ranks - 1: in two parts with the work of their ranks,
-// and so on.
-class Bisection {
- public:
-  Bisection(const std::vector<Vector3d>& positions, const std::vector<double>& work,
-            std::vector<int>& owner)
-      : x_(positions), work_(work), owner_(owner) {}
-
-  void cut(std::vector<int>::iterator begin, std::vector<int>::iterator end, int first, int ranks) {
-    if (ranks == 1 || begin == end) {
-      for (auto k = begin; k != end; ++k) owner_[at(*k)] = first;
-      return;
-    }
-    Eigen::AlignedBox3d box;
-    double all = 0;
-    for (auto k = begin; k != end; ++k) {
-      box.extend(x_[at(*k)]);
-      all += work_[at(*k)];
-    }
-    Eigen::Index axis = 0;
-    box.sizes().maxCoeff(&axis);
-    std::sort(begin, end, [&](int a, int b) {
-      const double u = x_[at(a)][axis], v = x_[at(b)][axis];
-      return u != v ? u < v : a < b;
-    });
-    const int half = ranks / 2;
-    double part = 0;
-    auto middle = begin;
-    while (middle != end && part * ranks < all * half) part += work_[at(*middle++)];
-    cut(begin, middle, first, half);
-    cut(middle, end, first + half, ranks - half);
-  }
-
- private:
-  const std::vector<Vector3d>& x_;
-  const std::vector<double>& work_;
-  std::vector<int>& owner_;
-};
-
 // The part, 0 .. parts - 1, of each position: recursive bisection across the longest side, with
 // about the same work in each part.
 std::vector<int> bisect(const std::vector<Vector3d>& positions, const std::vector<double>& work,
                         int parts) {
   std::vector<int> order(positions.size()), out(positions.size());
+  const auto cut = [&](const auto& again, auto begin, auto end, int first, int count) -> void {
+    if (count == 1 || begin == end) {
+      for (auto k = begin; k != end; ++k) out[at(*k)] = first;
+      return;
+    }
+    Eigen::AlignedBox3d box;
+    double all = 0;
+    for (auto k = begin; k != end; ++k) {
+      box.extend(positions[at(*k)]);
+      all += work[at(*k)];
+    }
+    Eigen::Index axis = 0;
+    box.sizes().maxCoeff(&axis);
+    std::sort(begin, end, [&](int a, int b) {
+      const double u = positions[at(a)][axis], v = positions[at(b)][axis];
+      return u != v ? u < v : a < b;
+    });
+    const int half = count / 2;
+    double sum = 0;
+    auto middle = begin;
+    while (middle != end && sum * count < all * half) sum += work[at(*middle++)];
+    again(again, begin, middle, first, half);
+    again(again, middle, end, first + half, count - half);
+  };
   std::iota(order.begin(), order.end(), 0);
-  Bisection(positions, work, out).cut(order.begin(), order.end(), 0, parts);
+  cut(cut, order.begin(), order.end(), 0, parts);
   return out;
 }
 

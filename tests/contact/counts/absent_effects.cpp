@@ -32,14 +32,10 @@ Residuals evaluate(const std::vector<RigidBody>&, const std::vector<PointContact
 
 namespace detail {
 using S = const BodyArrays&;
-Squares sweep(S, Law, GeneralContact*, GeneralContact*) { absent("friction"); }
-Squares test(S, Law, GeneralContact*, GeneralContact*, Coupled) { absent("friction"); }
-Squares sweep(S, Law, SphereContact*, SphereContact*) { absent("friction"); }
-Squares test(S, Law, SphereContact*, SphereContact*, Coupled) { absent("friction"); }
-Squares sweep(S, Law, GeneralGroup*, GeneralGroup*) { absent("friction"); }
-Squares test(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction"); }
-Squares sweep(S, Law, SphereGroup*, SphereGroup*) { absent("friction"); }
-Squares test(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
+Squares pass(S, Law, GeneralContact*, GeneralContact*, Coupled) { absent("friction"); }
+Squares pass(S, Law, SphereContact*, SphereContact*, Coupled) { absent("friction"); }
+Squares pass(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction"); }
+Squares pass(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
 std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions&, LawUse) {
   absent("rolling friction");

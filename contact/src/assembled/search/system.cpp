@@ -1,13 +1,12 @@
 // Tether: sweeps, block solutions and tests of a problem under a law. SPDX-License-Identifier:
 // BSD-3-Clause
-#include "assembled/search/system.hpp"
+#include "assembled/search/search.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 
 #include "law/kernels/exact_error.hpp"
-#include "law/kernels/rows.hpp"
 #include "problem/criterion.hpp"
 
 namespace tether::contact::detail {
@@ -104,7 +103,7 @@ void System::reset(const Problem& given, Law law) {
   const Problem& problem = *problem_;
   law_ = &detail::kernels(law);
   n_ = problem.contacts();
-  any_replaced_ = false;
+  rule_.clear();
   weight_.resize(at(n_));
   lambda_.assign(at(n_), -1);
   share_.resize(at(n_));
@@ -134,7 +133,6 @@ void System::reset(const Problem& given, Law law) {
     inverse_scale_[at(i)] = detail::inverse_scale(needed_[at(island)], norm2_[at(island)]);
   }
   norm_b_ = std::sqrt(sum);
-  sweeps = 0;
 }
 
 void System::belong_to(const System& whole, const int* contacts) {
@@ -150,13 +148,11 @@ void System::share_as(const System& whole, const int* contacts) {
 }
 
 void System::replace(int i) {
-  if (!any_replaced_) rule_.assign(at(n_), 0);
-  any_replaced_ = true;
+  rule_.resize(at(n_), 0);
   rule_[at(i)] = 1;
 }
 
 void System::sweep(PackedVector* x, const Proximal& proximal) {
-  ++sweeps;
   const View s = view(*problem_, rule_.data(), lambda_.data(), weight_.data(), proximal);
   kernels().sweep(s, x);
 }
@@ -180,34 +176,24 @@ void System::changes(const PackedVector* x, PackedVector* z, double* change) {
   }
 }
 
-void velocities(const Problem& problem, const PackedVector* x, PackedVector* w) {
-  multiply(view(problem, nullptr, nullptr, nullptr), x, w);
-}
-void System::velocities(const PackedVector* x, PackedVector* w) const {
-  detail::velocities(*problem_, x, w);
-}
-
-void System::velocities(const PackedVector* x, const PackedVector* b, PackedVector* w) const {
-  View s = view(*problem_, nullptr, nullptr, nullptr);
-  s.b = b;
-  multiply(s, x, w);
-}
-
-void exact_velocities(const Problem& problem, const PackedVector* x, PackedVector* w) {
+void velocities(const Problem& problem, bool long_sums, const PackedVector* x, PackedVector* w) {
   const View s = view(problem, nullptr, nullptr, nullptr);
+  if (!long_sums) return multiply(s, x, w);
   for (int i = 0; i < s.n; ++i) {
     Wide sum[3];
     wide_row(s, x, i, sum);
     for (int c = 0; c < 3; ++c) w[i].v[c] = static_cast<double>(sum[c]);
   }
 }
-void System::exact_velocities(const PackedVector* x, PackedVector* w) const {
-  detail::exact_velocities(*problem_, x, w);
+void System::velocities(const PackedVector* x, const PackedVector* b, PackedVector* w) const {
+  View s = view(*problem_, nullptr, nullptr, nullptr);
+  s.b = b;
+  multiply(s, x, w);
 }
 
 double System::natural_map(const PackedVector* x, PackedVector* scratch) const {
   if (!mass_.empty()) return natural_map_given(x, scratch);
-  const View s = view(*problem_, any_replaced_ ? rule_.data() : nullptr, nullptr, nullptr);
+  const View s = view(*problem_, any_replaced() ? rule_.data() : nullptr, nullptr, nullptr);
   const Norms n = kernels().natural_map(s, x, scratch);
   return relative(n, norm_b_);
 }
@@ -234,7 +220,7 @@ View System::error_view() {
 // The natural map depends on units and is evaluated in the given ones. It is homogeneous in x and w
 // together: both are divided by the power of two that makes the largest entry about 1.
 double System::natural_map_given(const PackedVector* x, PackedVector* scratch) const {
-  const View s = view(*problem_, any_replaced_ ? rule_.data() : nullptr, nullptr, nullptr);
+  const View s = view(*problem_, any_replaced() ? rule_.data() : nullptr, nullptr, nullptr);
   multiply(s, x, scratch);
   int most = std::numeric_limits<int>::min();
   const auto exponents = [&](int i) {

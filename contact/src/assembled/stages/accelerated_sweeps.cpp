@@ -24,8 +24,7 @@ void AcceleratedSweeps::start(const PackedVector* x) {
   grown_ = 1;
   sweeps_ = quiet_ = slow_ = 0;
   quiet_checked_ = kLeastQuiet;
-  accelerate_ = !carried();
-  eager_ = accelerate_;
+  mode_ = carried() ? Mode::waits : Mode::eager;
   earlier_ = {};
   later_ = {kRecent / 2, 0};
 }
@@ -36,7 +35,7 @@ void AcceleratedSweeps::replace(const PackedVector* x) {
   grown_ = 1;
   anderson_.clear();
   slow_ = 0;
-  eager_ = false;
+  if (mode_ == Mode::eager) mode_ = Mode::helps;
   least_f_ = window_f_ = std::numeric_limits<double>::infinity();
   earlier_ = {};
   later_ = {sweeps_, 0};
@@ -64,11 +63,11 @@ int AcceleratedSweeps::toggles(const System& system) {
 bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
   const bool calm = toggled <= std::max(kToggles, static_cast<int>(kToggledShare * n_));
   quiet_ = calm ? quiet_ + 1 : 0;
-  if (eager_ && sweep == 1) {
-    least_f_ = begun_f_ = f;
-    window_end_ = kWindow;
-  }
-  if (eager_ && sweep < kWindow) {
+  if (mode_ == Mode::eager && sweep < kWindow) {
+    if (sweep == 1) {
+      least_f_ = begun_f_ = f;
+      window_end_ = kWindow;
+    }
     if (f > 2 * least_f_) {
       anderson_.clear();
       least_f_ = f;
@@ -77,12 +76,14 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
     least_f_ = std::min(least_f_, f);
     return true;
   }
-  if (eager_) window_f_ = std::numeric_limits<double>::infinity();
-  eager_ = false;
-  if (!accelerate_) {
+  if (mode_ == Mode::eager) {
+    window_f_ = std::numeric_limits<double>::infinity();
+    mode_ = Mode::helps;
+  }
+  if (mode_ == Mode::waits) {
     if (quiet_ < (carried() ? std::max(kCarriedQuiet, quiet_checked_) : quiet_checked_))
       return false;
-    accelerate_ = true;
+    mode_ = Mode::helps;
     anderson_.clear();
     least_f_ = begun_f_ = window_f_ = f;
     window_end_ = sweep + kWindow;
@@ -95,7 +96,7 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
     window_end_ = sweep + kWindow;
   }
   if (failed) {
-    accelerate_ = false;
+    mode_ = Mode::waits;
     quiet_ = 0;
     quiet_checked_ = std::min(2 * quiet_checked_, kMostQuiet);
     return false;

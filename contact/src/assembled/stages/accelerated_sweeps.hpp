@@ -37,8 +37,10 @@ class AcceleratedSweeps {
   int n_ = 0;
   Anderson anderson_;
   std::vector<char> regime_;  // of each contact after the last sweep
+  // When sweeps are extrapolated: not before they are quiet; from the first one on, as in the first
+  // window of a solve; while it helps.
+  enum class Mode { waits, eager, helps } mode_ = Mode::waits;
   // f: weighted change of a sweep.
-  bool accelerate_ = false, eager_ = false;
   int sweeps_ = 0, quiet_ = 0, slow_ = 0, quiet_checked_ = kLeastQuiet, window_end_ = 0;
   double least_f_ = 0, begun_f_ = 0, window_f_ = 0;
   double recent_[kRecent] = {};

@@ -1,11 +1,143 @@
-// Tether: the factorised matrix of Newton steps, by contacts or by bodies. SPDX-License-Identifier:
-// BSD-3-Clause
+// Tether: the factorised matrix of Newton steps, by contacts or by bodies.
+// SPDX-License-Identifier: BSD-3-Clause
+
 #include "assembled/stages/newton_matrix.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <vector>
 
 namespace tether::contact::detail {
+namespace {
+
+typedef double v4 __attribute__((vector_size(32)));
+
+// C = A B, and C += A B
+TETHER_INLINE void multiply(const PackedBlock& A, const PackedBlock& B, PackedBlock& C) {
+  const v4* a = reinterpret_cast<const v4*>(A.column);
+  v4* c = reinterpret_cast<v4*>(C.column);
+  for (int j = 0; j < 3; ++j) {
+    const double* b = B.column + 4 * j;
+    c[j] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  }
+}
+TETHER_INLINE void add_product(const PackedBlock& A, const PackedBlock& B, PackedBlock& C) {
+  const v4* a = reinterpret_cast<const v4*>(A.column);
+  v4* c = reinterpret_cast<v4*>(C.column);
+  for (int j = 0; j < 3; ++j) {
+    const double* b = B.column + 4 * j;
+    c[j] += a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  }
+}
+TETHER_INLINE void apply(const PackedBlock& A, const double* x, double* y, double sign) {
+  const v4* a = reinterpret_cast<const v4*>(A.column);
+  *reinterpret_cast<v4*>(y) += sign * (a[0] * x[0] + a[1] * x[1] + a[2] * x[2]);
+}
+
+// values += H' X H for one contact, all pairs of its nodes.
+TETHER_CLONES void add_contact(const PackedBlock* H, const PackedBlock* turned, int nodes,
+                               const PackedBlock& X, const int* place, PackedBlock* values) {
+  for (int s = 0; s < nodes; ++s) {
+    PackedBlock right;
+    multiply(X, H[s], right);
+    for (int r = 0; r < nodes; ++r) add_product(turned[r], right, values[place[r * nodes + s]]);
+  }
+}
+
+}  // namespace
+
+void BodyNewton::order(const BodyForm& form) {
+  form_ = &form;
+  std::vector<std::vector<int>> others(at(form.nodes));
+  for (int k = 0; k < form.nodes; ++k) others[at(k)].push_back(k);
+  for (int i = 0; i < form.contacts(); ++i)
+    for (int r = form.start[at(i)]; r < form.start[at(i) + 1]; ++r)
+      for (int s = form.start[at(i)]; s < form.start[at(i) + 1]; ++s)
+        if (s != r) others[at(form.node[at(r)])].push_back(form.node[at(s)]);
+  start_.assign(1, 0);
+  columns_.clear();
+  for (std::vector<int>& list : others) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    columns_.insert(columns_.end(), list.begin(), list.end());
+    start_.push_back(static_cast<int>(columns_.size()));
+  }
+  const BlockPattern pattern{form.nodes, start_.data(), columns_.data()};
+  lu_.order(pattern);
+  lu_.analyse(pattern, nullptr);
+  place_.clear();
+  place_start_.assign(1, 0);
+  for (int i = 0; i < form.contacts(); ++i) {
+    for (int r = form.start[at(i)]; r < form.start[at(i) + 1]; ++r)
+      for (int s = form.start[at(i)]; s < form.start[at(i) + 1]; ++s) {
+        const int row = form.node[at(r)];
+        const auto begin = columns_.begin() + start_[at(row)];
+        const auto end = columns_.begin() + start_[at(row) + 1];
+        place_.push_back(
+            static_cast<int>(std::lower_bound(begin, end, form.node[at(s)]) - columns_.begin()));
+      }
+    place_start_.push_back(static_cast<int>(place_.size()));
+  }
+  values_.resize(columns_.size());
+  inverse_.resize(at(form.contacts()));
+  inverse_left_.resize(inverse_.size());
+  right_inverse_.resize(inverse_.size());
+  p_.resize(at(form.nodes));
+}
+
+void BodyNewton::begin() {
+  std::fill(values_.begin(), values_.end(), PackedBlock());
+  for (int row = 0; row < static_cast<int>(p_.size()); ++row)
+    for (int k = start_[at(row)]; k < start_[at(row + 1)]; ++k)
+      if (columns_[at(k)] == row)
+        for (int c = 0; c < 3; ++c) values_[at(k)].column[5 * c] = 1;
+}
+
+void BodyNewton::add(int i, const PackedBlock& D, const PackedBlock& L, const PackedBlock& R) {
+  using Map = Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>;
+  Eigen::Map<Eigen::Matrix3d, 0, Eigen::OuterStride<4>>(inverse_[at(i)].column) =
+      Map(D.column).partialPivLu().inverse();
+  PackedBlock X;
+  multiply(R, inverse_[at(i)], right_inverse_[at(i)]);
+  multiply(inverse_[at(i)], L, inverse_left_[at(i)]);
+  multiply(right_inverse_[at(i)], L, X);
+  const int first = form_->start[at(i)];
+  add_contact(form_->H.data() + first, form_->turned.data() + first,
+              form_->start[at(i) + 1] - first, X, place_.data() + place_start_[at(i)],
+              values_.data());
+}
+
+bool BodyNewton::factor() {
+  for (int row = 0; row < lu_.size(); ++row) {
+    const int node = lu_.block_row(row);
+    lu_.begin_row(row);
+    for (int k = start_[at(node)]; k < start_[at(node + 1)]; ++k)
+      lu_.add(columns_[at(k)], values_[at(k)].column);
+    if (!lu_.end_row()) return false;
+  }
+  return true;
+}
+
+void BodyNewton::solve(PackedVector* y) {
+  std::fill(p_.begin(), p_.end(), PackedVector());
+  const int n = form_->contacts();
+  for (int i = 0; i < n; ++i) {
+    alignas(32) double z[4] = {0, 0, 0, 0};
+    apply(right_inverse_[at(i)], y[i].v, z, 1);
+    for (int k = form_->start[at(i)]; k < form_->start[at(i) + 1]; ++k)
+      apply(form_->turned[at(k)], z, p_[at(form_->node[at(k)])].v, 1);
+  }
+  lu_.solve(p_.data());
+  for (int i = 0; i < n; ++i) {
+    alignas(32) double z[4] = {0, 0, 0, 0}, out[4] = {0, 0, 0, 0};
+    for (int k = form_->start[at(i)]; k < form_->start[at(i) + 1]; ++k)
+      apply(form_->H[at(k)], p_[at(form_->node[at(k)])].v, z, 1);
+    apply(inverse_[at(i)], y[i].v, out, 1);
+    apply(inverse_left_[at(i)], z, out, -1);
+    for (int c = 0; c < 3; ++c) y[i].v[c] = out[c];
+  }
+}
+
 namespace {
 
 constexpr double kClearly = 0.5;  // of the price by contacts: the digits cost refinements
@@ -14,51 +146,47 @@ constexpr double kOrderBodies = 500, kOrderContacts = 100;  // ns a contact, a b
 }  // namespace
 
 double NewtonMatrix::cost(const Search& search) const {
-  if (ordered_ && by_bodies_) return bodies_.cost() + sweeps_ * search.sweep_cost;
+  if (by_bodies()) return bodies_.cost() + sweeps_ * search.sweep_cost;
   const double blocks = static_cast<double>(search.system.problem().blocks().size());
   const double operations =
-      ordered_ ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
+      ordered() ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
   return 4 * operations + sweeps_ * search.sweep_cost + 25 * blocks +
          per_contact_ * search.system.size();
 }
 
 bool NewtonMatrix::order_by_bodies(Search& search) {
-  if (ordered_) return by_bodies_;
+  if (ordered()) return by_bodies();
   const BodyForm* given = search.system.body_form();
   if (given == nullptr || 2 * given->contacts() < kContactsOfBody * given->nodes) return false;
   bodies_.order(*given);
   if (!(bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * cost(search))) return false;
   search.counts.work += kOrderBodies * search.system.size();
-  ordered_ = by_bodies_ = true;
+  form_ = Form::bodies;
   return true;
 }
 
 void NewtonMatrix::order(Search& search) {
-  if (ordered_ || order_by_bodies(search)) return;
-  const linalg::BlockPattern blocks = pattern(search.system.problem());
+  // Four contacts a body cost a quarter in equations of bodies, 2.8 as much as in those of
+  // contacts.
+  constexpr int kSome = 3;  // contacts for two nodes
+  if (ordered()) return;
+  order_for_parts(search);
+  if (by_bodies()) return;
   search.counts.work +=
       kOrderContacts * static_cast<double>(search.system.problem().blocks().size());
-  lu_.order(blocks);
-  lu_.analyse(blocks, nullptr);
-  ordered_ = true;
-  take_bodies_if_cheaper(search);
-}
-
-// Four contacts a body cost a quarter in equations of bodies, 2.8 as much as in those of contacts.
-void NewtonMatrix::take_bodies_if_cheaper(Search& search) {
-  constexpr int kSome = 3;  // contacts for two nodes
+  lu_.analyse(pattern(search.system.problem()), nullptr);
   const BodyForm* given = search.system.body_form();
   if (given == nullptr || 2 * given->contacts() < kSome * given->nodes) return;
   const double by_contacts = cost(search);
   search.counts.work += kOrderBodies * search.system.size();
   bodies_.order(*given);
-  by_bodies_ = bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * by_contacts;
+  if (bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * by_contacts) form_ = Form::bodies;
 }
 
 void NewtonMatrix::order_for_parts(Search& search) {
-  if (ordered_ || order_by_bodies(search)) return;
+  if (ordered() || order_by_bodies(search)) return;
   lu_.order(pattern(search.system.problem()));
-  ordered_ = true;
+  form_ = Form::contacts;
 }
 
 }  // namespace tether::contact::detail

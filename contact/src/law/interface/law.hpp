@@ -5,7 +5,6 @@
 #include <tether/contact/problem.hpp>
 
 #include "kernels/body_contacts.hpp"
-#include "law/interface/law_tangent.hpp"
 #include "law/interface/local_geometry.hpp"
 
 // A law is a struct of static members in a file of this folder:
@@ -16,7 +15,7 @@
 //   solve_singular(L, bn, b0, b1, x, regime, evaluations)   the same for a singular block, or false
 //   derivative(L, bn, b0, b1, x, regime, out)      dx/db of that solution
 //   gamma(L, out)                slip is opposite to x_t/|x_t| + gamma
-//   tangent(L, x, w, out)        the relation between changes of x and w (law_tangent.hpp)
+//   tangent(L, x, w, out)        the relation between changes of x and w (local_geometry.hpp)
 //   natural_point(L, x, w, v)    the nearest admissible impulse to x - w under the law, whose
 //                                distance from x is the residual `natural_map`
 //
@@ -60,14 +59,6 @@ struct AssembledKernels {
   Test (*error)(const View&, const PackedVector* x);
   double (*exact_error)(const View&, const PackedVector* x, double* each);  // exact_error.hpp
 };
-struct BodyKernels {
-  Squares (*sweep)(const BodyArrays&, GeneralContact* begin, GeneralContact* end);
-  Squares (*test)(const BodyArrays&, GeneralContact* begin, GeneralContact* end, Coupled);
-};
-struct GroupKernels {
-  Squares (*pass)(const BodyArrays&, GeneralGroup* begin, GeneralGroup* end,
-                  Coupled);  // null: sweep
-};
 
 // Programs that need no kernels need not link them: traits and kernels are apart.
 struct LawTraits {
@@ -76,17 +67,15 @@ struct LawTraits {
   bool friction;
 };
 
-struct LawKernels {
-  Law law;
-  const char* name;
-  bool friction;
+struct LawKernels : LawTraits {
   Regime (*solve)(const LocalBlock&, const double* b, double* x, double& lambda, int& evaluations);
   void (*gamma)(const LocalBlock&, double* out);
   void (*natural_point)(const LocalBlock&, const double* x, const double* w, double* v);
   void (*tangent)(const LocalBlock&, const double* x, const double* w, LawTangent& out);
   AssembledKernels assembled;
-  BodyKernels bodies;
-  GroupKernels groups;
+  // As detail::pass (body_kernels.hpp).
+  Squares (*pass)(const BodyArrays&, GeneralContact* begin, GeneralContact* end, Coupled);
+  Squares (*group_pass)(const BodyArrays&, GeneralGroup* begin, GeneralGroup* end, Coupled);
   // The law that takes over at single contacts where this one has no fixed point, and the kernels
   // of both together; null: none.
   const LawKernels* replacement;

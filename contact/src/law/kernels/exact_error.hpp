@@ -1,12 +1,55 @@
-// Tether: errors of contacts below the round-off of double sums (method, section 3.2).
-// SPDX-License-Identifier: BSD-3-Clause
+// Tether: rows of A x - b, and errors of contacts below the round-off of double sums (method,
+// section 3.2). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/contact/evaluate.hpp>
 
 #include "law/interface/law.hpp"
+
+namespace tether::contact::detail {
+namespace {
+
+typedef double v4 __attribute__((vector_size(32)));
+
+// w = (A x - b)_i
+TETHER_INLINE void row(const View& s, const PackedVector* x, int i, double* w) {
+  v4 sum0 = -*reinterpret_cast<const v4*>(s.b[i].v), sum1 = {0, 0, 0, 0}, sum2 = {0, 0, 0, 0};
+  for (int k = s.start[i]; k < s.start[i + 1]; ++k) {
+    const v4* c = reinterpret_cast<const v4*>(s.blocks[k].column);
+    const double* xj = x[s.columns[k]].v;
+    sum0 += c[0] * xj[0];
+    sum1 += c[1] * xj[1];
+    sum2 += c[2] * xj[2];
+  }
+  *reinterpret_cast<v4*>(w) = sum0 + sum1 + sum2;
+}
+
+// Right-hand side of the block problem, residual form: D x_i - w_i (method, section 4).
+TETHER_INLINE void block_rhs(const View& s, const PackedVector* x, int i, const double* w,
+                             double* r) {
+  const LocalBlock& L = s.local[i];
+  const double x0 = x[i].v[0], x1 = x[i].v[1], x2 = x[i].v[2];
+  r[0] = L.a * x0 + L.c[0] * x1 + L.c[1] * x2;
+  r[1] = L.c[0] * x0 + L.T[0] * x1 + L.T[1] * x2;
+  r[2] = L.c[1] * x0 + L.T[1] * x1 + L.T[2] * x2;
+  if (s.anchor == nullptr) {
+    r[0] -= w[0];
+    r[1] -= w[1];
+    r[2] -= w[2];
+  } else {
+    const double* p = s.anchor[i].v;
+    const double d0 = x0 - p[0], d1 = x1 - p[1], d2 = x2 - p[2], f = 1 / (1 + s.tau);
+    r[0] -= f * (w[0] + s.tau * (L.a * d0 + L.c[0] * d1 + L.c[1] * d2));
+    r[1] -= f * (w[1] + s.tau * (L.c[0] * d0 + L.T[0] * d1 + L.T[1] * d2));
+    r[2] -= f * (w[2] + s.tau * (L.c[1] * d0 + L.T[1] * d1 + L.T[2] * d2));
+  }
+}
+
+}  // namespace
+}  // namespace tether::contact::detail
 
 // With large mass ratios the terms of A x - b nearly cancel. A sum of doubles is off by up to one
 // unit u |A| |x| for each of its terms, and so are D x_i - w_i and the block solution; the rounding
@@ -136,7 +179,28 @@ inline Wide wide_error(const LocalBlock& L, double mu, const double* gamma, cons
   return std::max(error, outside);
 }
 
-// worst_error() (assembled_kernels.hpp) with long sums. each: receives the errors of all contacts,
+// Adds a contact to all residuals but fixed_point and natural_map, which belong to whole problems.
+inline void add_residuals(const LocalBlock& L, double mu, const double* gamma, const double* x,
+                          const double* w, const double* b, Residuals& r) {
+  const double t = std::hypot(x[1], x[2]);
+  r.signorini = std::max(r.signorini, std::abs(std::min(L.a * x[0], w[0])));
+  r.cone = std::max({r.cone, L.a * (t - mu * x[0]), -L.a * x[0]});
+  for (int c = 0; c < 3; ++c) {
+    r.dissipation += x[c] * w[c];
+    r.energy_change += 0.5 * x[c] * (w[c] - b[c]);
+  }
+  if (mu == 0 || !(x[0] > 0)) return;
+  // Distance of w_t to {0} (strictly inside) or to the ray of the law (on the cone).
+  double misfit = std::hypot(w[1], w[2]);
+  if (t > 0 && t >= mu * x[0] * (1 - 1e-9)) {
+    const double d0 = -(x[1] / t + gamma[0]), d1 = -(x[2] / t + gamma[1]), dd = d0 * d0 + d1 * d1;
+    const double s = dd > 0 ? std::max(0.0, (w[1] * d0 + w[2] * d1) / dd) : 0;
+    misfit = std::hypot(w[1] - s * d0, w[2] - s * d1);
+  }
+  r.alignment = std::max(r.alignment, misfit);
+}
+
+// worst_error() (define_law.hpp) with long sums. each: receives the errors of all contacts,
 // or null.
 template <class Rule>
 double exact_error(const View& s, const PackedVector* x, double* each) {

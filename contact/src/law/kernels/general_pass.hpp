@@ -4,11 +4,32 @@
 
 #include <cmath>
 
-#include "kernels/body_pass.hpp"
+#include "kernels/body_contacts.hpp"
 #include "law/interface/local_geometry.hpp"
 
 namespace tether::contact::detail {
 namespace {
+
+// A block in the frame in which its tangential part is diagonal.
+TETHER_INLINE LocalBlock diagonal_block(double a, double inv_a, double mu, double c0, double c1,
+                                        double beta0, double beta1) {
+  LocalBlock L;
+  const double gamma = mu * inv_a;
+  L.a = a;
+  L.inv_a = inv_a;
+  L.mu = mu;
+  L.c[0] = c0;
+  L.c[1] = c1;
+  L.g[0] = gamma * c0;
+  L.g[1] = gamma * c1;
+  L.e = std::sqrt(L.g[0] * L.g[0] + L.g[1] * L.g[1]);
+  L.beta[0] = beta0;
+  L.beta[1] = beta1;
+  L.cosine = 1;
+  L.sine = 0;
+  L.unique = false;
+  return L;
+}
 
 template <class L0, bool kTest>
 TETHER_INLINE Squares pass(const BodyArrays& s, GeneralContact* begin, GeneralContact* end,
@@ -33,21 +54,7 @@ TETHER_INLINE Squares pass(const BodyArrays& s, GeneralContact* begin, GeneralCo
     w0 *= share;
     w1 *= share;
     w2 *= share;
-    LocalBlock L;
-    L.a = c.a;
-    L.inv_a = c.inv_a;
-    L.mu = c.mu;
-    const double gamma = c.mu * c.inv_a;
-    L.c[0] = c.c[0];
-    L.c[1] = c.c[1];
-    L.g[0] = gamma * c.c[0];
-    L.g[1] = gamma * c.c[1];
-    L.e = std::sqrt(L.g[0] * L.g[0] + L.g[1] * L.g[1]);
-    L.beta[0] = c.beta[0];
-    L.beta[1] = c.beta[1];
-    L.cosine = 1;
-    L.sine = 0;
-    L.unique = false;
+    const LocalBlock L = diagonal_block(c.a, c.inv_a, c.mu, c.c[0], c.c[1], c.beta[0], c.beta[1]);
     // D x with T = diag(beta) + c c'/a
     const double cx = c.c[0] * c.x[1] + c.c[1] * c.x[2], dn = c.a * c.x[0] + cx, f = dn * c.inv_a;
     double x[3] = {c.x[0], c.x[1], c.x[2]}, lambda = c.lambda * share;

@@ -1,13 +1,166 @@
 // Tether: the path of interior points by its arclength. SPDX-License-Identifier: BSD-3-Clause
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/cone_scaling.hpp>
 #include <vector>
 
 #include "assembled/stages/interior/interior_point.hpp"
-#include "assembled/stages/interior/smoothed_pairs.hpp"
+#include "assembled/stages/interior/newton_step.hpp"
 
 namespace tether::contact::detail {
+
+/// x and u with x o u = nu e exactly, from any z = x - rho u: x is the smoothed part of z in the
+/// cone and rho u that of -z, eigenvalue by eigenvalue (l + sqrt(l^2 + 4 rho nu)) / 2. A step in z
+/// meets no cone: where a contact slides, sticks or is open x and u follow z almost linearly
+/// however small nu is, and z_t turns both (method, eq. 25).
+class SmoothedPairs {
+ public:
+  struct Place {
+    Packed z;
+    double log_nu = 0;
+  };
+
+  SmoothedPairs(const System& system, const InteriorEquations& equations);
+
+  /// Takes z from a pair.
+  void take(const ConePair& pair, double nu);
+  void set(ConePair& pair) const;
+  double nu() const { return std::exp(at_.log_nu); }
+  const Place& place() const { return at_; }
+  void go_to(const Place& place) { at_ = place; }
+  void move(const Packed& change, double length, double log_nu);
+
+  /// dz of a change of x and u.
+  void change_of(const ConePair& pair, Packed& out) const;
+  /// Changes count by their parts of what they change: each eigenvalue by its distance from the
+  /// kink between regimes, the direction of z_t by its angle.
+  double inner(const Packed& a, const Packed& b) const;
+  double largest(const Packed& change) const;
+
+ private:
+  struct Parts {
+    double v[3];
+  };
+  Parts parts(int i, const double* change) const;
+
+  const InteriorEquations& equations_;
+  std::vector<double> rho_;
+  Place at_;
+};
+
+namespace {
+
+// (l + sqrt(l^2 + 4 q)) / 2 without cancellation
+double positive_part(double l, double q) {
+  const double root = std::sqrt(l * l + 4 * q);
+  return l > 0 ? 0.5 * (l + root) : 2 * q / (root - l);
+}
+
+// z in the frame of its eigenvalues; any direction where z_t = 0.
+struct Spectrum {
+  explicit Spectrum(const double* z) : length(tangent(z)) {
+    if (length > 0) {
+      t[0] = z[1] / length;
+      t[1] = z[2] / length;
+    }
+    above = z[0] + length;
+    below = z[0] - length;
+  }
+  double length, above, below;
+  double t[2] = {1, 0};
+};
+
+void set_cone(double* x, double gap, double length, const double* direction) {
+  x[1] = length * direction[0];
+  x[2] = length * direction[1];
+  x[3] = gap;
+  x[0] = tangent(x) + gap;
+}
+
+void set_flat(double* x, double value) {
+  x[0] = x[3] = value;
+  x[1] = x[2] = 0;
+}
+
+}  // namespace
+
+SmoothedPairs::SmoothedPairs(const System& system, const InteriorEquations& equations)
+    : equations_(equations), rho_(at(system.size())) {
+  at_.z.resize(rho_.size());
+  for (int i = 0; i < system.size(); ++i)
+    rho_[at(i)] = 1 / mean_diagonal(system.problem().local(i));
+}
+
+void SmoothedPairs::take(const ConePair& pair, double nu) {
+  change_of(pair, at_.z);
+  at_.log_nu = std::log(nu);
+}
+
+void SmoothedPairs::set(ConePair& pair) const {
+  for (std::size_t i = 0; i < rho_.size(); ++i) {
+    const double rho = rho_[i], q = rho * nu();
+    double *x = pair.x[i].v, *u = pair.u[i].v;
+    if (equations_.flat(static_cast<int>(i))) {
+      const double z = at_.z[i].v[0];
+      set_flat(x, positive_part(z, q));
+      set_flat(u, positive_part(-z, q) / rho);
+      continue;
+    }
+    const Spectrum z(at_.z[i].v);
+    // |x_t| and rho |u_t| are half of z's length and of what its roots differ by.
+    const double roots =
+        std::sqrt(z.above * z.above + 4 * q) + std::sqrt(z.below * z.below + 4 * q);
+    const double share = roots > 0 ? 2 * z.length * (z.above + z.below) / (2 * roots) : 0;
+    const double back[2] = {-z.t[0], -z.t[1]};
+    set_cone(x, positive_part(z.below, q), 0.5 * (z.length + share), z.t);
+    set_cone(u, positive_part(-z.above, q) / rho, 0.5 * (z.length - share) / rho, back);
+  }
+}
+
+void SmoothedPairs::move(const Packed& change, double length, double log_nu) {
+  for (std::size_t i = 0; i < rho_.size(); ++i)
+    for (int c = 0; c < 3; ++c) at_.z[i].v[c] += length * change[i].v[c];
+  at_.log_nu += log_nu;
+}
+
+void SmoothedPairs::change_of(const ConePair& pair, Packed& out) const {
+  for (std::size_t i = 0; i < rho_.size(); ++i)
+    for (int c = 0; c < 3; ++c) out[i].v[c] = pair.x[i].v[c] - rho_[i] * pair.u[i].v[c];
+}
+
+SmoothedPairs::Parts SmoothedPairs::parts(int i, const double* d) const {
+  const double q = 4 * rho_[at(i)] * nu();
+  const double* v = at_.z[at(i)].v;
+  if (equations_.flat(i)) return {{d[0] / std::sqrt(v[0] * v[0] + q), 0, 0}};
+  const Spectrum z(v);
+  const double along = z.t[0] * d[1] + z.t[1] * d[2], across = z.t[0] * d[2] - z.t[1] * d[1];
+  // Inside of a cone directions do not matter, and the distance from it takes the place of |z_t|.
+  const double inside = std::max({z.below, -z.above, 0.0});
+  return {{(d[0] + along) / std::sqrt(z.above * z.above + q),
+           (d[0] - along) / std::sqrt(z.below * z.below + q),
+           across / std::sqrt(z.length * z.length + inside * inside + q)}};
+}
+
+double SmoothedPairs::inner(const Packed& a, const Packed& b) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < rho_.size(); ++i) {
+    const Parts p = parts(static_cast<int>(i), a[i].v), r = parts(static_cast<int>(i), b[i].v);
+    for (int c = 0; c < 3; ++c) sum += p.v[c] * r.v[c];
+  }
+  return sum;
+}
+
+double SmoothedPairs::largest(const Packed& change) const {
+  double most = 0;
+  for (std::size_t i = 0; i < rho_.size(); ++i) {
+    const Parts p = parts(static_cast<int>(i), change[i].v);
+    for (double v : p.v) most = std::max(most, std::abs(v));
+  }
+  return most;
+}
+
 namespace {
 
 // to += factor other

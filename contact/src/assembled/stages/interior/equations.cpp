@@ -1,5 +1,5 @@
 // Tether: the equations that interior points solve. SPDX-License-Identifier: BSD-3-Clause
-#include "assembled/stages/interior/equations.hpp"
+#include "assembled/stages/interior/newton_step.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,10 +23,7 @@ void InteriorEquations::find_flat(const System& system) {
 
 // w_: velocities at z_, of the proximal problem if there is one
 void InteriorEquations::velocities(const System& system) {
-  if (exact_)
-    system.exact_velocities(z_.data(), w_.data());
-  else
-    system.velocities(z_.data(), w_.data());
+  detail::velocities(system.problem(), exact_, z_.data(), w_.data());
   if (!(tau_ > 0)) return;
   for (int i = 0; i < n_; ++i) {
     const double* z = z_[at(i)].v;

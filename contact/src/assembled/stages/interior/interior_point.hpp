@@ -2,10 +2,36 @@
 #pragma once
 
 #include "assembled/stages/interior/newton_step.hpp"
-#include "assembled/stages/interior/sticking_point.hpp"
+#include "assembled/stages/newton_matrix.hpp"
 #include "assembled/stages/proximal_newton.hpp"
 
 namespace tether::contact::detail {
+
+/// A x = b by a matrix that is slightly shifted. Where x is admissible it is the solution, and
+/// refinements remove the shift.
+class StickingPoint {
+ public:
+  void reset(int contacts);
+  /// Once for a problem: one factorisation and tests. `flat`: contacts without friction.
+  void find(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat);
+  bool tried() const { return state_ != State::unknown; }
+  bool found() const { return state_ == State::found; }
+  /// In the frame where the cone is its own dual, (mu x_n, x_t).
+  const Packed& point() const { return x_; }
+  /// How far the point is outside of the cone at most, and the sum of its lengths.
+  double outside() const { return outside_; }
+  double size() const { return size_; }
+
+ private:
+  bool factor(const Problem& problem, NewtonMatrix& matrix) const;
+  void refine(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat);
+
+  enum class State { unknown, none, found } state_ = State::unknown;
+  double outside_ = 0, size_ = 0;
+  Packed x_, z_, w_;  // z: as impulses, w: their velocities
+};
+
+inline double mean_diagonal(const LocalBlock& L) { return (L.a + L.T[0] + L.T[2]) / 3; }
 
 // Follows x o u = nu e, nu -> 0, for x in K and u = w + s (mu, gamma) in K*, w = A x - b. With
 // s = s(u) the velocity w is an explicit function of u, so that one Newton matrix holds the law as

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "assembled/stages/interior/sticking_point.hpp"
+#include "assembled/stages/interior/interior_point.hpp"
 
 namespace tether::contact::detail {
 namespace {

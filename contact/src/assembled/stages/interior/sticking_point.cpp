@@ -1,5 +1,5 @@
 // Tether: the point where every contact sticks. SPDX-License-Identifier: BSD-3-Clause
-#include "assembled/stages/interior/sticking_point.hpp"
+#include "assembled/stages/interior/interior_point.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace tether::contact::detail {
 
 void StickingPoint::reset(int contacts) {
-  tried_ = found_ = false;
+  state_ = State::unknown;
   for (Packed* p : {&x_, &z_, &w_}) p->resize(at(contacts));
 }
 
@@ -45,8 +45,8 @@ bool StickingPoint::factor(const Problem& p, NewtonMatrix& matrix) const {
 }
 
 void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat) {
-  if (tried_) return;
-  tried_ = true;
+  if (tried()) return;
+  state_ = State::none;
   const Problem& p = search.system.problem();
   const int n = p.contacts();
   if (!factor(p, matrix)) return;
@@ -68,14 +68,13 @@ void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector
     outside_ = std::max(outside_, t - x[0]);
   }
   if (!std::isfinite(size_)) return;
-  found_ = true;
+  state_ = State::found;
   if (outside_ <= 0) refine(search, matrix, flat);
 }
 
 void StickingPoint::refine(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat) {
   constexpr int kRefinements = 6;
-  System& system = search.system;
-  const Problem& p = system.problem();
+  const Problem& p = search.system.problem();
   const int n = p.contacts();
   double last = std::numeric_limits<double>::infinity();
   for (int refinement = 0; refinement <= kRefinements; ++refinement) {
@@ -89,10 +88,7 @@ void StickingPoint::refine(Search& search, NewtonMatrix& matrix, const std::vect
     // a solve each.
     if ((search.solved() && !exact) || !(error < 0.5 * last)) return;
     last = error;
-    if (exact)
-      system.exact_velocities(z_.data(), w_.data());
-    else
-      system.velocities(z_.data(), w_.data());
+    velocities(p, exact, z_.data(), w_.data());
     matrix.solve(w_.data());
     search.count_sweep();
     for (int i = 0; i < n; ++i)
