@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <initializer_list>
 #include <numeric>
 #include <tether/linalg/least_squares.hpp>
 
@@ -242,6 +244,44 @@ static bool are_the_equations(Evaluator& rows, const Residual& residual,
   });
 }
 
+// Those of the rows `which` that constrain the differential variables in a direction that is not in
+// `plain`, and for each equation whether such a row needs it.
+static std::pair<std::vector<int>, std::vector<char>> rows_in_new_directions(
+    const std::vector<int>& which, const Span& plain, const std::vector<int>& algebraic,
+    const Point& away, const Point& here) {
+  std::vector<int> rows;
+  std::vector<char> used(at(here.h.rows()), 0);
+  for (int i : which) {
+    Eigen::VectorXd x, x_here;
+    if (!away.explain(i, algebraic, &x) || !here.explain(i, algebraic, &x_here)) continue;
+    Eigen::VectorXd reduced = here.C.row(i).transpose() - here.h.transpose() * x_here;
+    for (int j : algebraic) reduced[j] = 0.0;
+    if (!(plain.rest(reduced).norm() > kRestricts * (1.0 + x_here.norm()))) continue;
+    rows.push_back(i);
+    for (Eigen::Index e = 0; e < x.size(); ++e)
+      if (x[e] != 0.0 || x_here[e] != 0.0) used[at(e)] = 1;
+  }
+  return {rows, used};
+}
+
+// Marks the algebraic variables that these rows and equations contain at one of the points.
+static std::vector<char> algebraic_in(
+    const std::vector<int>& rows, const std::vector<char>& used, const std::vector<int>& algebraic,
+    std::initializer_list<std::reference_wrapper<const Point>> points) {
+  std::vector<char> found;
+  for (const Point& point : points) {
+    found.resize(point.y.size(), 0);
+    const auto mark = [&](const Dense& a, int i) {
+      for (int j : algebraic)
+        if (a(i, j) != 0.0) found[at(j)] = 1;
+    };
+    for (int i : rows) mark(point.C, i);
+    for (std::size_t e = 0; e < used.size(); ++e)
+      if (used[e]) mark(point.h, static_cast<int>(e));
+  }
+  return found;
+}
+
 // The unknowns that the equations notice, by large changes near a point where nothing is zero.
 static void find_columns(const Residual& residual, double t, const std::vector<double>& point,
                          JoinedEquations* found) {
@@ -299,35 +339,9 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
       !here.evaluate_equations(residual, equations, WT, free, algebraic))
     return found;
 
-  // Finds the rows that constrain y_d in a new direction, and the equations that they need.
-  std::vector<char> used(equations.size(), 0);
-  std::vector<int> joint;
-  for (int i : hanging) {
-    Eigen::VectorXd x, x_here;
-    if (!away.explain(i, algebraic, &x) || !here.explain(i, algebraic, &x_here)) continue;
-    Eigen::VectorXd reduced = here.C.row(i).transpose() - here.h.transpose() * x_here;
-    for (int j : algebraic) reduced[j] = 0.0;
-    if (!(plain.rest(reduced).norm() > kRestricts * (1.0 + x_here.norm()))) continue;
-    joint.push_back(i);
-    for (Eigen::Index e = 0; e < x.size(); ++e)
-      if (x[e] != 0.0 || x_here[e] != 0.0) used[at(e)] = 1;
-  }
+  const auto [joint, used] = rows_in_new_directions(hanging, plain, algebraic, away, here);
   if (joint.empty()) return found;
-
-  found.moves.assign(at(n), 0);
-  const auto mark = [&](const Dense& a, int i) {
-    for (int j : algebraic)
-      if (a(i, j) != 0.0) found.moves[at(j)] = 1;
-  };
-  for (int i : joint) {
-    mark(away.C, i);
-    mark(here.C, i);
-  }
-  for (std::size_t e = 0; e < used.size(); ++e)
-    if (used[e]) {
-      mark(away.h, static_cast<int>(e));
-      mark(here.h, static_cast<int>(e));
-    }
+  found.moves = algebraic_in(joint, used, algebraic, {away, here});
   // Rows without other algebraic variables move with them. Equations that they repeat are left out.
   Span together;
   const auto follows = [&](int j) { return id[j] == 0.0 && !found.moves[at(j)]; };
