@@ -99,11 +99,18 @@ TETHER_INLINE Squares pass(const BodyArrays& s, SmoothContact* begin, SmoothCont
 }
 
 using S = const BodyArrays&;
-TETHER_CLONES Squares spheres(S s, SphereContact* b, SphereContact* e, Coupled c) {
-  return c ? pass<true>(s, b, e, c) : pass<false>(s, b, e, c);
+// Sweeps and tests apart: one function for both would keep fewer numbers in registers.
+TETHER_CLONES Squares sweep_spheres(S s, SphereContact* b, SphereContact* e) {
+  return pass<false>(s, b, e, nullptr);
 }
-TETHER_CLONES Squares smooth(S s, SmoothContact* b, SmoothContact* e, Coupled c) {
-  return c ? pass<true>(s, b, e, c) : pass<false>(s, b, e, c);
+TETHER_CLONES Squares test_spheres(S s, SphereContact* b, SphereContact* e, Coupled c) {
+  return pass<true>(s, b, e, c);
+}
+TETHER_CLONES Squares sweep_smooth(S s, SmoothContact* b, SmoothContact* e) {
+  return pass<false>(s, b, e, nullptr);
+}
+TETHER_CLONES Squares test_smooth(S s, SmoothContact* b, SmoothContact* e, Coupled c) {
+  return pass<true>(s, b, e, c);
 }
 
 }  // namespace
@@ -112,8 +119,10 @@ Squares pass(S s, Law law, GeneralContact* b, GeneralContact* e, Coupled c) {
   return kernels(law).pass(s, b, e, c);
 }
 Squares pass(S s, Law, SphereContact* b, SphereContact* e, Coupled c) {
-  return spheres(s, b, e, c);
+  return c ? test_spheres(s, b, e, c) : sweep_spheres(s, b, e);
 }
-Squares pass(S s, Law, SmoothContact* b, SmoothContact* e, Coupled c) { return smooth(s, b, e, c); }
+Squares pass(S s, Law, SmoothContact* b, SmoothContact* e, Coupled c) {
+  return c ? test_smooth(s, b, e, c) : sweep_smooth(s, b, e);
+}
 
 }  // namespace tether::contact::detail

@@ -198,9 +198,20 @@ auto PackedContacts::read(Kind k, int place, const F& f) const {
   return f(smooth_[at(place)]);
 }
 
-// The same for a contact that f changes.
+// The same for a contact that f changes, in place or in its group.
 template <class F>
 void PackedContacts::change(Kind k, int place, const F& f) {
+  switch (k) {
+    case Kind::general:
+      return f(general_[at(place)]);
+    case Kind::sphere:
+      return f(spheres_[at(place)]);
+    case Kind::smooth:
+      return f(smooth_[at(place)]);
+    case Kind::general4:
+    case Kind::sphere4:
+      break;
+  }
   read(k, place, [&](auto contact) {
     f(contact);
     put(contact, k, place);

@@ -96,9 +96,17 @@ double LawRows::start(int law, const Eigen::Vector3d* last) const {
   return laws[law].limit ? x : std::clamp(x, -N, N);
 }
 
-LawState LawRows::state(int law) const {
-  const double bound = laws[law].limit ? 0 : laws[law].bound * dt_;
-  return {at_bound(law), impulses[at(law)], bound};
+LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
+  const JointLaws::Law& each = laws[law];
+  LawState out;
+  out.side = at_bound(law);
+  out.impulse = impulses[at(law)];
+  out.body = moving_along(law);
+  if (each.limit) return out;
+  out.came = speed(law, coming_) - each.rate;
+  out.left = speed(law, v) - each.rate;
+  out.bound = each.bound * dt_;
+  return out;
 }
 
 // Sign of the impulse; 0: the bound does not hold it.

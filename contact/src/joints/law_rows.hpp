@@ -38,7 +38,8 @@ class LawRows {
   BodyCone cone(int law, LawUse use) const;
   /// Starting impulse from that of the last step; null: there is none.
   double start(int law, const Eigen::Vector3d* last) const;
-  LawState state(int law) const;
+  /// v: at the end of the sub-step.
+  LawState state(int law, const std::vector<Vector6d>& v) const;
 
  private:
   static constexpr std::uint64_t kFirstId = std::uint64_t{1} << 63;

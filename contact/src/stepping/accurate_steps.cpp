@@ -19,6 +19,8 @@ constexpr double kAtOnce = 0.1;     // of the accuracy: what an impact may come 
 constexpr int kManyImpacts =
     1000;  // in a step: from then on they end it in as many sub-steps at most
 constexpr double kSlips = 1 - 1e-6;  // of the cone
+constexpr double kStill = 0.01;      // of the accuracy: a slip that moves nothing in a sub-step
+constexpr double kBeforeEnd = 0.95;  // of a sub-step: a switch that ends it
 
 Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaternion& to) {
   linalg::Quaternion d = to * from.conjugate();
@@ -26,6 +28,22 @@ Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaterni
   const double sine = d.vec().norm();
   return sine > 0 ? Vector3d(2 * std::atan2(sine, d.w()) / sine * d.vec())
                   : Vector3d(Vector3d::Zero());
+}
+
+Vector3d slip_of(const std::vector<RigidBody>& motion, const PointContact& c) {
+  const auto velocity = [&](int body, const Vector3d& r) -> Vector3d {
+    if (body < 0) return Vector3d::Zero();
+    const RigidBody& b = motion[at(body)];
+    return b.velocity + b.angular_velocity.cross(r);
+  };
+  const Vector3d v = velocity(c.first, c.r1) - velocity(c.second, c.r2);
+  return v - c.normal.dot(v) * c.normal;
+}
+
+/// The zero behind b of the line through (ta, a) and (tb, b), b behind a; infinite: there is none.
+double zero_behind(double ta, double a, double tb, double b) {
+  if (!(b > 0 && a > b)) return std::numeric_limits<double>::infinity();
+  return tb + b * (tb - ta) / (a - b);
 }
 
 }  // namespace
@@ -44,7 +62,7 @@ bool AccurateSteps::advance(double time, double length) {
 // Lists what contacts have done in the sub-step just taken.
 void AccurateSteps::list_active(double length, std::vector<Active>& list) const {
   list.clear();
-  if (stepper_.joints) list_laws(list);
+  if (stepper_.joints) list_laws(length, list);
   if (!stepper_.near) return;
   for (std::size_t k = 0; k < stepper_.contacts.points.size(); ++k) {
     const PointContact& c = stepper_.contacts.points[k];
@@ -61,6 +79,13 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
     const bool slips = c.mu > 0 && !(tangent.norm() < kSlips * c.mu * normal);
     list.push_back(
         {c.id, slips ? Behaviour::slips : Behaviour::sticks, slips ? tangent : Vector3d::Zero()});
+    Active& a = list.back();
+    a.force = normal / length;
+    a.margin = (c.mu * normal - tangent.norm()) / length;
+    for (const int body : {c.first, c.second})
+      if (body >= 0) a.size = std::max(a.size, stepper_.sizes[at(body)]);
+    a.came = slip_of(before_.motion, c);
+    a.speed = slip_of(stepper_.bodies.motion, c).norm();
   }
   if (stepper_.rolling) list_moments(list);
   for (const Impact& i : stepper_.impacts->list())
@@ -73,7 +98,7 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
 }
 
 // As contacts, behind all of them: limits that press stick, laws at their bound slip.
-void AccurateSteps::list_laws(std::vector<Active>& list) const {
+void AccurateSteps::list_laws(double length, std::vector<Active>& list) const {
   std::vector<LawState> laws;
   stepper_.joints->list_laws(laws);
   for (std::size_t k = 0; k < laws.size(); ++k) {
@@ -81,6 +106,12 @@ void AccurateSteps::list_laws(std::vector<Active>& list) const {
     if (law.impulse == 0 || std::isinf(law.bound)) continue;  // springs never slip
     list.push_back({~std::uint64_t{0} - k, law.side != 0 ? Behaviour::slips : Behaviour::sticks,
                     law.side * Vector3d::UnitX()});
+    Active& a = list.back();
+    a.force = std::abs(law.impulse) / length;
+    a.margin = (law.bound - std::abs(law.impulse)) / length;
+    a.size = law.body < 0 ? 1 : stepper_.sizes[at(law.body)];
+    a.came = law.came * Vector3d::UnitX();
+    a.speed = std::abs(law.left);
   }
 }
 
@@ -92,15 +123,17 @@ void AccurateSteps::list_moments(std::vector<Active>& list) const {
     const double normal = c.normal.dot(stepper_.contacts.impulses[k]);
     if (!(normal > 0)) continue;
     const Meeting& m = stepper_.near->meeting(c);
-    const Vector3d spin = c.normal.dot(moments[k]) * c.normal;
-    const auto add = [&](const Vector3d& moment, double arm, int bit) {
-      if (!(arm > 0)) return;
-      const bool turns = !(moment.norm() < kSlips * arm * normal);
-      list.push_back({c.id ^ std::uint64_t{1} << bit, turns ? Behaviour::slips : Behaviour::sticks,
-                      turns ? moment : Vector3d::Zero()});
-    };
-    add(moments[k] - spin, m.rolling, 62);
-    add(spin, m.torsional, 63);
+    const Vector3d spin = c.normal.dot(moments[k]) * c.normal, roll = moments[k] - spin;
+    if (m.rolling > 0) {
+      const bool turns = !(roll.norm() < kSlips * m.rolling * normal);
+      list.push_back(
+          {c.id, turns ? Behaviour::rolls : Behaviour::rolls_not, turns ? roll : Vector3d::Zero()});
+    }
+    if (m.torsional > 0) {
+      const bool turns = !(spin.norm() < kSlips * m.torsional * normal);
+      list.push_back(
+          {c.id, turns ? Behaviour::spins : Behaviour::spins_not, turns ? spin : Vector3d::Zero()});
+    }
   }
 }
 
@@ -143,6 +176,46 @@ double AccurateSteps::first_impact(double length, double& at_once) const {
       take(moment(s.gap, s.came, s.comes, s.body < 0 ? 1 : stepper_.sizes[at(s.body)], length));
   if (stepper_.near)
     for (const Impact& i : stepper_.impacts->list()) take(moment(i, length));
+  return first;
+}
+
+// Time at which the first contact changes its behaviour within a sub-step: lifts, stops or slips,
+// by linear interpolation. Slips start from the begin of the sub-step or, if they end in its first
+// half, from the sub-step before; forces start from that one. Infinite: none is known.
+double AccurateSteps::first_switch(double length) const {
+  double first = std::numeric_limits<double>::infinity();
+  const auto find = [](const std::vector<Active>& list, std::uint64_t id) -> const Active* {
+    const auto found = std::find_if(list.begin(), list.end(), [&](const Active& a) {
+      return a.id == id && a.behaviour <= Behaviour::slips;
+    });
+    return found != list.end() ? &*found : nullptr;
+  };
+  for (const Active& a : active_[1]) {
+    if (a.behaviour > Behaviour::slips) continue;
+    const Active* past = find(past_, a.id);
+    // Friction stops what slips, or has turned against what it did at the start.
+    const double came = a.came.norm();
+    if (came * length > kStill * stepper_.options.accuracy * a.size &&
+        (a.behaviour == Behaviour::sticks || a.slip.dot(a.came) > 0)) {
+      const double way = 2 * past_length_;
+      first = std::min(first, past != nullptr && past->behaviour == Behaviour::slips
+                                  ? zero_behind(-way, past->came.norm(), 0, came)
+                                  : length / 4);
+      continue;
+    }
+    const Active* then = find(active_[2], a.id);
+    const bool turns = then != nullptr && a.behaviour == Behaviour::slips &&
+                       then->behaviour == Behaviour::slips && !(then->slip.dot(a.slip) > 0);
+    if (then != nullptr && then->behaviour == a.behaviour && !turns) continue;
+    if (then != nullptr && a.behaviour == Behaviour::slips) {
+      first = std::min(first, zero_behind(0, came, length / 2, a.speed));
+      continue;
+    }
+    if (past == nullptr || past->behaviour != a.behaviour) continue;
+    const bool lifts = then == nullptr;
+    first = std::min(first, zero_behind(-past_length_ / 2, lifts ? past->force : past->margin,
+                                        length / 4, lifts ? a.force : a.margin));
+  }
   return first;
 }
 
@@ -204,6 +277,8 @@ bool AccurateSteps::take_halves(double time, double length) {
 
 // Accepts a sub-step and chooses the length of the next. cut: this one was shorter than planned.
 void AccurateSteps::accept(double time, double length, double error, bool smooth, bool cut) {
+  past_ = active_[2];
+  past_length_ = length / 2;
   if (smooth) {
     extrapolate();
     if (stepper_.joints) stepper_.joints->begin(stepper_.bodies, time + length);
@@ -227,7 +302,7 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
     stepper_.tally = before;
     ++stepper_.counts.rejected;
   };
-  bool cut = shortened;
+  bool cut = shortened, switched = false;
   for (;;) {
     const bool whole = advance(time, length);
     if (!(length > shortest)) break;
@@ -255,6 +330,13 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
     stepper_.tally = before;
     const bool smooth = take_halves(time, length);
     const double off = std::max(error(length, smooth), 1e-4);
+    const double when = smooth || switched ? length : first_switch(length);
+    if (when > shortest && when < kBeforeEnd * length && off > 0.05) {
+      back();
+      length = when;
+      cut = switched = true;
+      continue;
+    }
     if (off > 1) {
       back();
       length =
@@ -272,6 +354,7 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
 
 void AccurateSteps::take(double start, double length) {
   double done = 0, shortest = kShortest * length;
+  past_.clear();  // a run that goes on from a saved state has none
   for (int taken_parts = 0; done < length; ++taken_parts) {
     if (taken_parts == kManyImpacts) shortest = length / kManyImpacts;
     const double left = length - done, least = std::min(shortest, left);

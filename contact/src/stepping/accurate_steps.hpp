@@ -21,12 +21,24 @@ class AccurateSteps {
   StepperMemory::Control control;  ///< how the next step goes on
 
  private:
-  enum class Behaviour : std::uint8_t { sticks, slips, strikes };
+  enum class Behaviour : std::uint8_t {
+    sticks,
+    slips,
+    strikes,
+    rolls,
+    rolls_not,
+    spins,
+    spins_not
+  };
   /// Behaviour of a contact, a law of a joint or a moment in a sub-step.
   struct Active {
     std::uint64_t id;
     Behaviour behaviour;
     Eigen::Vector3d slip;  // impulse, or moment, against it
+    // A contact's mean normal force and mean distance from the cone; speed of slip at the end;
+    // size.
+    double force = 0, margin = 0, speed = 0, size = 0;
+    Eigen::Vector3d came = Eigen::Vector3d::Zero();  // slip at the start
   };
   struct Moment {
     double when, early;  // s
@@ -38,10 +50,11 @@ class AccurateSteps {
   Moment moment(double gap, double came, double comes, double size, double length) const;
   Moment moment(const Impact& i, double length) const;
   void list_active(double length, std::vector<Active>& list) const;
-  void list_laws(std::vector<Active>& list) const;
+  void list_laws(double length, std::vector<Active>& list) const;
   void list_moments(std::vector<Active>& list) const;
   static bool same(const std::vector<Active>& a, const std::vector<Active>& b);
   double first_impact(double length, double& at_once) const;
+  double first_switch(double length) const;
   double error(double length, bool smooth) const;
   void extrapolate();
 
@@ -49,6 +62,9 @@ class AccurateSteps {
   StepHalving& halving_;
   BodiesState before_, whole_;  // a sub-step: before it, and after it whole
   std::array<std::vector<Active>, 3> active_;
+  // Contacts of the second half of the sub-step before this one, in the same step; its length.
+  std::vector<Active> past_;
+  double past_length_ = 0;
 };
 
 }  // namespace tether::contact::detail

@@ -32,7 +32,7 @@ class ConsistentStart {
         point_(point) {}
 
   /// yy and yp change on success only; IDA starts again at them. `weights` is filled in. `reached`:
-  /// time of IDA's last step; NaN: there was none.
+  /// time of IDA's last step; minus infinity: there was none.
   ConsistencyReport make(double t0, N_Vector yy, N_Vector yp, const Consistency& how,
                          N_Vector weights, double reached);
   /// Whether IDA's present step is such a one.

@@ -40,12 +40,13 @@ class History {
   /// Accepted before the last attempt with a candidate; -1: there was none.
   long steps() const { return seen_; }
 
-  /// Time of the last attempt that was handed over, in this run or an earlier one; NaN: none was.
+  /// Time of the last attempt that was handed over, in this run or an earlier one; minus infinity:
+  /// none.
   double reached() const { return reached_; }
 
  private:
   long seen_ = -1, handed_ = -1;
-  double reached_ = std::numeric_limits<double>::quiet_NaN();
+  double reached_ = -std::numeric_limits<double>::infinity();
 };
 
 /// Norm of IDA's error test. `mask` is 1 for the variables that it sees; null: for all.

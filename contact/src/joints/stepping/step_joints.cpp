@@ -66,7 +66,7 @@ std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& option
 }
 
 void StepJoints::list_laws(std::vector<LawState>& out) const {
-  for (int k = 0; k < laws_.laws.count(); ++k) out.push_back(laws_.state(k));
+  for (int k = 0; k < laws_.laws.count(); ++k) out.push_back(laws_.state(k, v_));
 }
 
 // Equations of the positions at time t. Factors are of no place while they are made: the caller's

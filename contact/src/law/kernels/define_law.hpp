@@ -211,9 +211,15 @@ TETHER_INLINE Regime solve_block(const LocalBlock& block, const double* b, doubl
                              int& evaluations) {                                                   \
     return solve_block<L>(block, b, x, lambda, evaluations);                                       \
   }                                                                                                \
-  TETHER_CLONES Squares body_pass(const BodyArrays& s, GeneralContact* b, GeneralContact* e,       \
+  TETHER_CLONES Squares body_sweep(const BodyArrays& s, GeneralContact* b, GeneralContact* e) {    \
+    return pass<L, false>(s, b, e, nullptr);                                                       \
+  }                                                                                                \
+  TETHER_CLONES Squares body_test(const BodyArrays& s, GeneralContact* b, GeneralContact* e,       \
                                   Coupled c) {                                                     \
-    return c ? pass<L, true>(s, b, e, c) : pass<L, false>(s, b, e, c);                             \
+    return pass<L, true>(s, b, e, c);                                                              \
+  }                                                                                                \
+  Squares body_pass(const BodyArrays& s, GeneralContact* b, GeneralContact* e, Coupled c) {        \
+    return c ? body_test(s, b, e, c) : body_sweep(s, b, e);                                        \
   }                                                                                                \
   TETHER_GROUP_KERNELS(L, Lanes)                                                                   \
   TETHER_ASSEMBLED_KERNELS(plain, Laws<L>)                                                         \

@@ -30,7 +30,9 @@ struct Strike {
 /// Record of what a law of a joint has done in a sub-step.
 struct LawState {
   int side = 0;                   ///< sign of the impulse that its bound allows no more of; else 0
+  double came = 0, left = 0;      ///< speeds beside the wanted one, where the part began and ended
   double impulse = 0, bound = 0;  ///< N s, N m s
+  int body = -1;                  ///< as of Strike
 };
 
 /// Contact problems of islands with joints or rolling friction (ConeIslands).
