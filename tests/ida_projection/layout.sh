@@ -16,7 +16,7 @@ for folder in attach constraints host movers rows start step watch; do
 done | tsort >/dev/null
 # Which symbols are there shows that names are seen at all.
 names=$(nm -C "$2" | grep -o 'tether::ida_projection::[A-Z][A-Za-z]*' | sort -u)
-echo "$names" | grep -q 'Mover$'
+echo "$names" | grep -q 'RowsAt$'
 for name in SensitivityCorrector ParameterDerivative DistributedStore GradientStore; do
   if echo "$names" | grep -q "::$name\$"; then
     echo "$2 has $name" >&2

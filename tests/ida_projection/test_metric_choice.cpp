@@ -5,7 +5,7 @@
 #include <nvector/nvector_serial.h>
 
 #include "host.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 #include "rows/row_levels.hpp"
 #include "step/metric_choice.hpp"
 #include "support/catch.hpp"
@@ -108,11 +108,11 @@ double slide(int points, double h, bool with_sum = false) {
   Options options;
   options.advanced.metric = Metric::local_correction;
   Statistics statistics;
-  Mover mover(options, make_contiguous_rows(rows, options, statistics, at.n, false));
+  const auto mover = make_contiguous_rows(rows, options, statistics, at.n, false);
   const Candidate candidate = at.candidate(h);
-  REQUIRE(mover.rows().set_algebraic(candidate, nullptr) == Status::success);
-  REQUIRE(mover.move(candidate).status == Status::success);
-  CHECK(mover.remaining_drift(candidate) <= 1e-12);
+  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->move(candidate).status == Status::success);
+  CHECK(mover->remaining_drift(candidate) <= 1e-12);
   double largest = 0.0;
   for (int i = 0; i < 2 * points; ++i)
     largest = std::max(largest, std::abs(candidate.correction_entries[i] - 1e-4));
@@ -129,10 +129,10 @@ long solutions_of_failure(int points, bool sparse) {
   options.advanced.maximum_iterations = 1;
   options.advanced.tolerance = 1e-12;
   Statistics statistics;
-  Mover mover(options, make_contiguous_rows(rows, options, statistics, at.n, sparse));
+  const auto mover = make_contiguous_rows(rows, options, statistics, at.n, sparse);
   const Candidate candidate = at.candidate(1e-4);
-  REQUIRE(mover.rows().set_algebraic(candidate, nullptr) == Status::success);
-  REQUIRE(mover.move(candidate).status == Status::not_converged);
+  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->move(candidate).status == Status::not_converged);
   return statistics.iterations;
 }
 
@@ -160,10 +160,10 @@ double rate_by_nearly_dependent_rows(int points) {
   options.advanced.metric = Metric::local_correction;
   options.advanced.tolerance = 1e-6;
   Statistics statistics;
-  Mover mover(options, make_contiguous_rows(sparse, options, statistics, at.n, true));
+  const auto mover = make_contiguous_rows(sparse, options, statistics, at.n, true);
   const Candidate candidate = at.candidate(1e-12);
-  REQUIRE(mover.rows().set_algebraic(candidate, nullptr) == Status::success);
-  REQUIRE(mover.move(candidate).status == Status::success);
+  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->move(candidate).status == Status::success);
   const auto y = [&](int i) { return candidate.base_entries[i] + candidate.correction_entries[i]; };
   return std::abs(y(0) * y(2 * points) + y(1) * y(2 * points + 1));
 }

@@ -16,7 +16,7 @@
 #include "host/ida.hpp"
 #include "host/ida_lifetime.hpp"
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 #include "start/algebraic.hpp"
 #include "start/consistent_start.hpp"
 #include "start/joined_rows.hpp"
@@ -129,10 +129,12 @@ class Projection::Impl {
   bool bypassed() { return observer_.bypassed(history_.steps(), run_.phase != Phase::late); }
   void current_weights(N_Vector y);
 
-  int step(const Attempt& attempt, const Candidate& candidate, double tolerance, bool call_setup);
-  void begin_run(const Attempt& attempt, const Candidate& candidate);
+  void note_vectors(N_Vector y_predicted, N_Vector ycor, N_Vector weights);
+  int answer(Candidate candidate);
+  int step(const Attempt& attempt, double tolerance, bool call_setup);
+  int begin_moves(const Attempt& attempt, bool* needed);
+  void begin_run(const Candidate& candidate);
   bool in_trouble(const Attempt& attempt, const Candidate& candidate);
-  int correct(const Candidate& candidate, double tolerance, bool call_setup);
   int corrector_failed(const Candidate& candidate, int flag);
   bool begin_attempt(const Attempt& attempt, const Candidate& candidate);
   void find_linear_solver_kind(long steps);
@@ -145,11 +147,11 @@ class Projection::Impl {
   int hand_over(const Attempt& attempt, const Candidate& candidate, double moved);
   int finish(Status outcome, const std::string& text);
 
-  // Movers of the caller's rows alone (null: there are none), and joined with equations of F.
-  struct Movers {
+  // The caller's rows alone (null: there are none), and joined with equations of F.
+  struct Rows {
     JoinedRows joined;
-    std::unique_ptr<Mover> own;
-    Mover* used = nullptr;
+    std::unique_ptr<RowsAt> own;
+    RowsAt* used = nullptr;
   };
   // Vectors of the host's problem.
   struct Unknowns {
@@ -184,7 +186,7 @@ class Projection::Impl {
   AlgebraicVariables variables_;
   Polish polish_;
   StepControl control_;
-  Movers movers_;
+  Rows rows_;
   PointProjection point_;
   ConsistentStart start_;
   Observer observer_;
@@ -192,6 +194,7 @@ class Projection::Impl {
   std::unique_ptr<Companion> sensitivities_;
   std::unique_ptr<RowsAt> gradient_;  // of project_gradient()
   Unknowns unknowns_;
+  Candidate present_;  // of this attempt
   Metric wanted_metric_;
   MetricChoice metric_choice_;
   History history_;

@@ -30,7 +30,7 @@ int Projection::Impl::initialize() {
   // If IDAS solves states and sensitivities together it bypasses this solver, and no getter tells
   // so. IDASetMaxNonlinIters is called to see whether it arrives here. Without constraints
   // nothing would be lost.
-  if (movers_.used != nullptr && !corrector_.is_reached_by(ida_)) {
+  if (rows_.used != nullptr && !corrector_.is_reached_by(ida_)) {
     finish(Status::simultaneous_sensitivities,
            "IDAS with IDA_SIMULTANEOUS does not use the state's nonlinear solver, so nothing would "
            "be projected; use IDA_STAGGERED in IDASensInit");
@@ -43,16 +43,17 @@ int Projection::Impl::initialize() {
   run_.phase = Phase::watching;
   options_.advanced.metric = wanted_metric_;
   history_.reset();
+  present_ = Candidate();
   report_.reset();
   observer_.reset();
   variables_.begin_run();
-  movers_.joined.forget();
-  movers_.used = movers_.own.get();
-  if (movers_.used != nullptr) movers_.used->reset();
+  rows_.joined.forget();
+  rows_.used = rows_.own.get();
+  if (rows_.used != nullptr) rows_.used->reset();
   if (sensitivities_) sensitivities_->forget_run();
   control_.reset();
   metric_choice_.reset();
-  return corrector_.initialize();
+  return corrector_.initialize();  // all variables are in the convergence test again
 }
 
 int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weights, double tolerance,
@@ -71,59 +72,61 @@ int Projection::Impl::solve(N_Vector y_predicted, N_Vector ycor, N_Vector weight
     return kFatal;  // status and message keep the exception that broke the run
 
   const Attempt attempt = history_.begin(ida_);
-  Candidate candidate{attempt.t, y_predicted, ycor, weights};
+  Candidate& candidate = present_;
+  if (y_predicted != candidate.base || ycor != candidate.correction || weights != candidate.weights)
+    note_vectors(y_predicted, ycor, weights);
+  candidate.t = attempt.t;
   candidate.cj = attempt.cj;
-  if (unknowns_.contiguous) candidate.with_entries();
-  if (movers_.joined.mover() != nullptr) movers_.joined.begin(candidate);
+  candidate.h = std::abs(attempt.h);
+  RowsAt* const rows = rows_.used;
+  if (rows_.joined.rows() != nullptr) rows_.joined.begin(candidate);
   corrector_.begin(mem);
-  if (movers_.used != nullptr) movers_.used->rows().report.fatal = false;
+  if (rows != nullptr) rows->report.fatal = false;
   control_.restore_weights(weights, history_.rejected(attempt));
-  int flag = 0;
-  if (start_.asks()) {
-    report_.advise(start_.answer(candidate));
-  } else {
-    if (unknowns_.contiguous) {
-      candidate.h = std::abs(attempt.h);
-      candidate.predicted_rate = N_VGetArrayPointer(attempt.yp_predicted);
-    }
-    flag = step(attempt, candidate, tolerance, call_setup);
-  }
+  const int flag = start_.asks() ? answer(candidate) : step(attempt, tolerance, call_setup);
   // A failed evaluation of the plugin's own does no harm, but a fatal flag ends the run.
-  const bool ended =
-      corrector_.stopped() || (movers_.used != nullptr && movers_.used->rows().report.fatal);
-  if (flag >= 0 && ended) flag = finish(Status::callback_fatal, movers_.used->message());
-  return corrector_.stopped() ? corrector_.stop_flag() : flag;
+  if (corrector_.stopped() || (rows_.used != nullptr && rows_.used->report.fatal)) {
+    const int code = flag < 0 ? flag : finish(Status::callback_fatal, rows_.used->report.text);
+    return corrector_.stopped() ? corrector_.stop_flag() : code;
+  }
+  return flag;
+}
+
+// IDA's vectors of the attempts. They and their entries stay where they are in a run.
+void Projection::Impl::note_vectors(N_Vector y_predicted, N_Vector ycor, N_Vector weights) {
+  present_ = {0.0, y_predicted, ycor, weights, ida_.step().yp_predicted};
+  if (unknowns_.contiguous) present_.with_entries();
+}
+
+// For initial values, which no step leads to.
+int Projection::Impl::answer(Candidate candidate) {
+  candidate.h = 0.0;
+  candidate.predicted_slope = nullptr;
+  candidate.predicted_rate = nullptr;
+  report_.advise(start_.answer(candidate));
+  return 0;
 }
 
 // One attempt at a step: correct, move the candidate onto the constraints, polish (method, section
 // 2). Returns the code for IDA. Until a first move is needed the run is that of IDA, bit for bit.
-int Projection::Impl::step(const Attempt& attempt, const Candidate& candidate, double tolerance,
-                           bool call_setup) {
-  if (movers_.used == nullptr) {
-    const int flag = correct(candidate, tolerance, call_setup);
+int Projection::Impl::step(const Attempt& attempt, double tolerance, bool call_setup) {
+  const Candidate& candidate = present_;
+  if (rows_.used == nullptr) {
+    const int flag = corrector_.correct(candidate, tolerance, call_setup);
     return flag != 0 ? flag : hand_over(attempt, candidate, infinite);
   }
-  if (history_.steps() < 0) begin_run(attempt, candidate);
+  if (history_.steps() < 0) begin_run(candidate);
   if (!engaged() && in_trouble(attempt, candidate)) {
     const Status begun = engage(candidate);
-    if (begun != Status::success) return finish(begun, movers_.used->message());
+    if (begun != Status::success) return finish(begun, rows_.used->report.text);
   }
-  int flag = correct(candidate, tolerance, call_setup);
+  int flag = corrector_.correct(candidate, tolerance, call_setup);
   if (flag != 0) return corrector_failed(candidate, flag);
   if (!begin_attempt(attempt, candidate)) return report_.end(Status::collapsed);
   if (!engaged()) {
-    const Move first = movers_.used->measure(candidate);
-    if (first.status != Status::success) {
-      const int code = finish(first.status, movers_.used->message());
-      // In the first step rows that contradict each other do so at every step size.
-      return attempt.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
-    }
-    if (first.length <= std::max(kNothing, first.floor) && !control_.struggling(attempt)) {
-      observer_.skipped(first);
-      return hand_over(attempt, candidate, infinite);
-    }
-    const Status begun = engage(candidate);
-    if (begun != Status::success) return finish(begun, movers_.used->message());
+    bool moves = false;
+    flag = begin_moves(attempt, &moves);
+    if (flag != 0 || !moves) return flag;
   }
   observer_.begin_move();
   const bool fresh = call_setup || !corrector_.has_setup();  // IDA's factors cannot be better
@@ -133,18 +136,37 @@ int Projection::Impl::step(const Attempt& attempt, const Candidate& candidate, d
     // A stale Jacobian has fooled IDA's convergence test: correct again with a fresh one.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, candidate.correction);
-    flag = correct(candidate, tolerance, true);
+    flag = corrector_.correct(candidate, tolerance, true);
     if (flag != 0) return corrector_failed(candidate, flag);
     polish_.note_setup(attempt.cj);
     move = move_and_polish(candidate, tolerance, true);
   }
-  observer_.after_move(attempt, candidate, move, polish_.corrected(), *movers_.used);
+  observer_.after_move(attempt, candidate, move, polish_.corrected(), *rows_.used);
   if (move.status != Status::success)
     return finish(move.status,
-                  movers_.used->message() + observer_.suspicion(attempt, candidate, move.status));
+                  rows_.used->report.text + observer_.suspicion(attempt, candidate, move.status));
   run_.last_move = move.length;
   run_.left = move.left;
   return hand_over(attempt, candidate, move.length);
+}
+
+// Before the first move: whether this attempt needs one. Returns the code for IDA.
+int Projection::Impl::begin_moves(const Attempt& attempt, bool* needed) {
+  const Candidate& candidate = present_;
+  const Move first = rows_.used->measure(candidate);
+  if (first.status != Status::success) {
+    const int code = finish(first.status, rows_.used->report.text);
+    // In the first step rows that contradict each other do so at every step size.
+    return attempt.steps == 0 && first.status == Status::inconsistent ? kFatal : code;
+  }
+  if (first.length <= std::max(kNothing, first.floor) && !control_.struggling(attempt)) {
+    observer_.skipped(first);
+    return hand_over(attempt, candidate, infinite);
+  }
+  const Status begun = engage(candidate);
+  if (begun != Status::success) return finish(begun, rows_.used->report.text);
+  *needed = true;
+  return 0;
 }
 
 // IDA will judge this attempt. `moved`: the length of the move; infinity: none was made.
@@ -155,7 +177,7 @@ int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candida
   const bool sudden = in_use(Mechanism::tested_long_moves) && std::isfinite(moved) &&
                       moved > options_.advanced.largest_move &&
                       moved > kSudden * run_.accepted_move &&
-                      movers_.used->rows().factors == RowsAt::Factors::of_all_rows;
+                      rows_.used->factors == RowsAt::Factors::of_all_rows;
   control_.choose_step(
       attempt, candidate, polish_, moved, run_.suppressed ? variables_.tested() : nullptr,
       run_.suppressed ? variables_.id() : nullptr, sudden ? polish_.corrected() : nullptr);
@@ -165,13 +187,13 @@ int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candida
 
 // Gives fast kernels to IDA's vectors that pass through here and to the plugin's own, before the
 // first attempt of a run. Vectors of the caller stay as they are.
-void Projection::Impl::begin_run(const Attempt& attempt, const Candidate& candidate) {
+void Projection::Impl::begin_run(const Candidate& candidate) {
   N_Vector newton = nullptr;
   if (options_.nonlinear_solver == nullptr)
     newton = static_cast<SUNNonlinearSolverContent_Newton>(corrector_.inner()->content)->delta;
-  fast::quicken({candidate.correction, attempt.residual}, false);
+  fast::quicken({candidate.correction, ida_.step().residual}, false);
   polish_.quicken();
-  fast::quicken({attempt.y_predicted, attempt.yp_predicted, candidate.weights, newton}, true);
+  fast::quicken({candidate.base, candidate.predicted_slope, candidate.weights, newton}, true);
   observer_.begin_run(candidate);
 }
 
@@ -187,17 +209,6 @@ bool Projection::Impl::in_trouble(const Attempt& attempt, const Candidate& candi
   return variables_.high_index() && variables_.any();
 }
 
-int Projection::Impl::correct(const Candidate& candidate, double tolerance, bool call_setup) {
-  static const std::vector<int> none;
-  const bool may_leave_out = engaged() && options_.suppress_algebraic;
-  corrector_.expect_followers(
-      in_use(Mechanism::followers) && may_leave_out && !variables_.high_index() ? variables_.id()
-                                                                                : nullptr);
-  return corrector_.correct(
-      candidate, tolerance, call_setup,
-      may_leave_out && in_use(Mechanism::free_multipliers) ? variables_.undetermined() : none);
-}
-
 int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   if (flag > 0) control_.corrector_failed();
   polish_.corrector_failed();
@@ -206,7 +217,7 @@ int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
 }
 
 // Judges the last attempt, once this one has a candidate. False: the run is hopeless.
-bool Projection::Impl::begin_attempt(const Attempt& attempt, const Candidate& candidate) {
+inline bool Projection::Impl::begin_attempt(const Attempt& attempt, const Candidate& candidate) {
   history_.found(attempt);
   if (!run_.iterative) find_linear_solver_kind(attempt.steps);
   const long setups = ida_.setups();
@@ -215,9 +226,9 @@ bool Projection::Impl::begin_attempt(const Attempt& attempt, const Candidate& ca
   if (std::isfinite(std::exchange(run_.handed_move, infinite)) && attempt.accepted) {
     run_.left_before = run_.left;
     run_.accepted_move = run_.last_move;
-    movers_.used->rows().accept();
+    rows_.used->accept();
   }
-  if (control_.starts_off_equations(attempt)) leave_out_of_error_test(false);
+  if (attempt.steps == 0 && control_.starts_off_equations(attempt)) leave_out_of_error_test(false);
   return observer_.begin_attempt(attempt, candidate);
 }
 
@@ -254,12 +265,16 @@ Status Projection::Impl::engage(const Candidate& candidate) {
     control_.begin_smoothing(
         setpoint_of_high_index(candidate, variables_, constraints_.total_count()));
   observer_.check_form(candidate);
-  if (in_use(Mechanism::joined_equations)) movers_.joined.join(candidate);
-  movers_.used = movers_.joined.mover() != nullptr ? movers_.joined.mover() : movers_.own.get();
+  if (in_use(Mechanism::joined_equations)) rows_.joined.join(candidate);
+  rows_.used = rows_.joined.rows() != nullptr ? rows_.joined.rows() : rows_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
-  const Status structured =
-      movers_.used->rows().set_algebraic(candidate, movers_.joined.moved_id());
-  if (structured == Status::success) run_.phase = Phase::engaged;  // else the next attempt tries
+  const Status structured = rows_.used->set_algebraic(candidate, rows_.joined.moved_id());
+  if (structured != Status::success) return structured;  // the next attempt tries again
+  run_.phase = Phase::engaged;
+  if (!options_.suppress_algebraic) return structured;
+  if (in_use(Mechanism::followers) && !variables_.high_index())
+    corrector_.expect_followers(variables_.id());
+  if (in_use(Mechanism::free_multipliers)) corrector_.leave_out(variables_.undetermined());
   return structured;
 }
 
@@ -289,15 +304,14 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   }
   if (before != Fix::none) polish_.keep(candidate);
   Move& move = moved;
-  move = movers_.used->move(candidate);
+  move = rows_.used->move(candidate);
   if (move.capped) {
     judge_capped(move);
     return moved;  // the steps below would make the whole move
   }
   if (move.status == Status::success && may_change_metric()) {
     const bool by_levels = metric_choice_.by_levels();
-    move =
-        metric_choice_.improved(candidate, move, *movers_.used, polish_, variables_.high_index());
+    move = metric_choice_.improved(candidate, move, *rows_.used, polish_, variables_.high_index());
     if (by_levels != metric_choice_.by_levels() && in_use(Mechanism::expected_oscillations))
       control_.expect_oscillations();
   }
@@ -308,7 +322,7 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   // The polish is a refinement: if F or the linear solver fails in it, the move stands. A fatal
   // flag is kept by the corrector and ends the run.
   if (polishes) moved.fix = polish(true);
-  if (moved.fix != Fix::none) move.status = movers_.used->settle(candidate, polish_.delta());
+  if (moved.fix != Fix::none) move.status = rows_.used->settle(candidate, polish_.delta());
   return moved;
 }
 
@@ -324,11 +338,10 @@ bool Projection::Impl::polishes_first() const {
 
 // Whether the metric may be changed and the response of F is available.
 bool Projection::Impl::may_change_metric() const {
-  return in_use(Mechanism::other_metric) && movers_.used->rows().may_use_levels() &&
-         wanted_metric_ == Metric::automatic && options_.group.empty() &&
-         options_.advanced.metric == Metric::local_correction &&
-         movers_.used == movers_.own.get() && unknowns_.contiguous &&
-         polish_.is_response_available();
+  return wanted_metric_ == Metric::automatic && rows_.used->may_use_levels() &&
+         in_use(Mechanism::other_metric) && options_.group.empty() &&
+         options_.advanced.metric == Metric::local_correction && rows_.used == rows_.own.get() &&
+         unknowns_.contiguous && polish_.is_response_available();
 }
 
 // Capped moves approach the constraints step by step from a start off them. A step that ends
@@ -336,10 +349,9 @@ bool Projection::Impl::may_change_metric() const {
 void Projection::Impl::judge_capped(Move& move) {
   if (move.left <= std::max(1.0, run_.left_before)) return;
   move.status = Status::move_too_long;
-  movers_.used->rows().report.text =
-      "the move onto the constraints, capped at " + brief(move.length) +
-      " tolerances (Advanced::largest_move), leaves " + brief(move.left) +
-      ", which the error test does not allow; use a larger largest_move";
+  rows_.used->report.text = "the move onto the constraints, capped at " + brief(move.length) +
+                            " tolerances (Advanced::largest_move), leaves " + brief(move.left) +
+                            ", which the error test does not allow; use a larger largest_move";
 }
 
 int Projection::Impl::caught(Status outcome, const char* text) noexcept {

@@ -30,9 +30,9 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
       variables_(statistics_),
       polish_(options_, statistics_, corrector_, variables_),
       control_(ida_, options_, statistics_),
-      movers_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
+      rows_{JoinedRows(constraints_, options_, statistics_, corrector_, variables_), nullptr},
       point_(constraints_, options_),
-      start_(ida_, options_, corrector_, variables_, movers_.joined, point_),
+      start_(ida_, options_, corrector_, variables_, rows_.joined, point_),
       observer_(constraints_, options_, statistics_, report_, ida_, lifetime_, corrector_,
                 variables_),
       wanted_metric_(options_.advanced.metric) {
@@ -43,9 +43,8 @@ Projection::Impl::Impl(void* ida_mem, Constraints set, Options options)
   unknowns_.contiguous = is_contiguous(like);
   unknowns_.count = like->ops->nvgetlength != nullptr ? static_cast<int>(N_VGetLength(like)) : 0;
   if (has_rows(constraints_)) {
-    movers_.own =
-        std::make_unique<Mover>(options_, make_rows(constraints_, options_, statistics_, like));
-    movers_.used = movers_.own.get();
+    rows_.own = make_rows(constraints_, options_, statistics_, like);
+    rows_.used = rows_.own.get();
     polish_.allocate(like);
     polish_.allow_forecasts();
     unknowns_.weights = OwnedVector(like);
@@ -79,7 +78,7 @@ void Projection::Impl::attach() {
   require(SUNNonlinSolSetConvTestFn(solver_.get(), converged, nullptr), "a convergence test");
   require(SUNNonlinSolSetMaxIters(solver_.get(), corrector_.maximum_iterations()),
           "a number of iterations");
-  if (movers_.used != nullptr) observer_.attached();
+  if (rows_.used != nullptr) observer_.attached();
   const StepData step = ida_.step();
   lifetime_.watch(step.y_predicted, step.yp_predicted, [this] {
     std::string ignored;
@@ -144,7 +143,7 @@ ConsistencyReport Projection::Impl::make_consistent(double t0, N_Vector yy, N_Ve
            "; it must be one of Consistency::Derivative");
   ConsistencyReport report;
   report.status = Status::success;
-  if (!movers_.used) return report;
+  if (!rows_.used) return report;
   report = start_.make(t0, yy, yp, how, unknowns_.weights, history_.reached());
   if (report) reset_statistics();
   if (report.status == Status::internal_error &&
@@ -159,7 +158,7 @@ ConsistencyReport Projection::Impl::project(double t, N_Vector yy, N_Vector yp) 
   if (yy == nullptr) reject("project: yy must not be null");
   ConsistencyReport report;
   report.status = Status::success;
-  if (!movers_.used) return report;
+  if (!rows_.used) return report;
   current_weights(yy);
   const OwnedVector y = copy_of(yy), ydot = copy_of(yp);
   point_.project(t, y, {}, variables_.id(), unknowns_.weights, report);
@@ -196,7 +195,7 @@ int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret
     return lifetime_.over() ? IDA_MEM_NULL : IDA_ILL_INPUT;
   }
   const int flag = IDASolve(ida_.mem(), tout, tret, yret, ypret, itask);
-  if (flag < 0 || !movers_.used || bypassed()) return flag;
+  if (flag < 0 || !rows_.used || bypassed()) return flag;
   // A point at the end of a step is projected already, an interpolated one is not.
   const Status of_step = report_.status;
   const std::string text = report_.message;

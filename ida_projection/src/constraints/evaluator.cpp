@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tether/linalg/vector_code.hpp>
 
 #include "host/shortest.hpp"
 
@@ -74,32 +75,40 @@ Evaluator::Evaluator(const Constraints& constraints, Statistics& statistics, Row
 
 void Evaluator::flatten(const Constraints& set) {
   if (set.count > 0) {
-    parts_.push_back({&set, rows_});
+    const Part& part =
+        parts_.emplace_back(Part{&set, rows_, full_rows_, std::ptrdiff_t(entries_.size())});
     rows_ += set.count;
+    if (part.sparse != nullptr)
+      entries_.resize(entries_.size() + part.sparse->columns.size());
+    else
+      full_rows_ += set.count;
     uses_differences_ |= std::holds_alternative<FiniteDifferences>(set.jacobian);
-    gives_both_ |= parts_.back().gives_both;
-    has_sparse_ |= parts_.back().sparse != nullptr;
+    gives_both_ |= part.gives_both;
+    has_sparse_ |= part.sparse != nullptr;
   }
   for (const Constraints& part : set.joined) flatten(part);
 }
 
 template <class Fill>
-int Evaluator::write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries,
-                     Fill&& fill) {
-  const std::ptrdiff_t count = part.set->count;
-  const bool check_jacobian_rows = C != nullptr && !part.C_checked;
+int Evaluator::write_checked(const Part& part, int n, double* g, double* C, Fill&& fill) {
+  const std::ptrdiff_t count = part.set->count, entries = part.entries(n);
   double* const to =
-      g != nullptr ? part.g_room.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
-  double* into = C;
-  if (check_jacobian_rows) {
-    into = C_room_.begin(entries, entries + n);
-    std::copy(C, C + entries, into);
-  }
+      g != nullptr ? g_room_.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
+  double* const into = C != nullptr ? C_room_.begin(entries, entries + n) : nullptr;
+  if (g != nullptr) std::copy(g, g + count, to);
+  if (C != nullptr) std::copy(C, C + entries, into);
   const int flag = fill(to, into);
-  const bool within = (g == nullptr || part.g_room.end(g, count)) &
-                      (!check_jacobian_rows || C_room_.end(C, entries));
-  part.C_checked |= check_jacobian_rows;
+  const bool within =
+      (g == nullptr || g_room_.end(g, count)) & (C == nullptr || C_room_.end(C, entries));
+  part.g_checked |= g != nullptr;
+  part.C_checked |= C != nullptr;
   return within ? flag : kOverran;
+}
+
+inline int Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
+  return write(part, n, g, nullptr, [&](double* to, double*) {
+    return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
+  });
 }
 
 Status Evaluator::checked(int flag, const char* what, const Part& part) {
@@ -110,27 +119,28 @@ Status Evaluator::checked(int flag, const char* what, const Part& part) {
   return status;
 }
 
-int Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
-  return write(part, n, g, nullptr, 0, [&](double* to, double*) {
-    return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
-  });
-}
-
-Status Evaluator::value(double t, const double* y, int n, double* g) {
-  if (report.fatal) return Status::callback_fatal;
-  ++statistics_.value_evaluations;
+template <class Call>
+Status Evaluator::each(const char*& what, Call&& call) {
   const Part* at = nullptr;
   const int flag = guarded(
       [&] {
         for (const Part& part : parts_) {
           at = &part;
-          const int failed = value_of(part, t, y, n, g + part.first_row);
-          if (failed != 0) return failed;
+          if (const int failed = call(part); failed != 0) return failed;
         }
         return 0;
       },
       thrown_);
-  return flag == 0 ? finite(t, g) : checked(flag, "value", *at);
+  return flag == 0 ? Status::success : checked(flag, what, *at);
+}
+
+Status Evaluator::value(double t, const double* y, int n, double* g) {
+  if (report.fatal) return Status::callback_fatal;
+  ++statistics_.value_evaluations;
+  const char* what = "value";
+  const Status status =
+      each(what, [&](const Part& part) { return value_of(part, t, y, n, g + part.first_row); });
+  return status == Status::success ? finite(t, g) : status;
 }
 
 Status Evaluator::not_finite(double t, const double* g) {
@@ -143,77 +153,61 @@ Status Evaluator::not_finite(double t, const double* g) {
 
 // `what` names the callback. Entries that are not finite are found by the factorisation, which
 // reads them anyway.
-int Evaluator::rows_of(const Part& part, double t, const double* y, int n, const double* scale,
-                       const std::vector<int>& columns, double* C, double* g, const char** what) {
-  const int count = part.set->count;
+TETHER_INLINE int Evaluator::rows_of(const Part& part, const At& at, double* C, double* g,
+                                     const char** what) {
   const bool both = g != nullptr && part.gives_both;
   if (g != nullptr && !both) {
     *what = "value";
-    const int flag = value_of(part, t, y, n, g);
+    const int flag = value_of(part, at.t, at.y, at.n, g);
     if (flag != 0) return flag;
   }
   if (part.dense == nullptr && part.sparse == nullptr) {
     *what = "value (differences)";
-    return differences(part, t, y, n, scale, columns, C);
+    return differences(part, at, C);
   }
   *what = both ? "value with jacobian" : "jacobian";
-  const std::ptrdiff_t size = part.entries(n);
-  const ConstVector point(y, n);
-  return write(part, n, both ? g : nullptr, C, size, [&](double* to, double* entries) {
+  const int count = part.set->count;
+  const ConstVector point(at.y, at.n);
+  return write(part, at.n, both ? g : nullptr, C, [&](double* to, double* entries) {
     if (part.sparse != nullptr) {
-      const Vector into(entries, size);
-      return both ? part.sparse->fill_with_value(t, point, Vector(to, count), into)
-                  : part.sparse->fill(t, point, into);
+      const Vector into(entries, part.entries(at.n));
+      return both ? part.sparse->fill_with_value(at.t, point, Vector(to, count), into)
+                  : part.sparse->fill(at.t, point, into);
     }
-    const Matrix into(entries, count, n);
-    return both ? part.dense->fill_with_value(t, point, Vector(to, count), into)
-                : part.dense->fill(t, point, into);
+    const Matrix into(entries, count, at.n);
+    return both ? part.dense->fill_with_value(at.t, point, Vector(to, count), into)
+                : part.dense->fill(at.t, point, into);
   });
 }
 
-template <class Place>
-Status Evaluator::all_rows(double t, const double* y, int n, const double* scale,
-                           const std::vector<int>& columns, double* g, Place place) {
+Status Evaluator::all_rows(const At& at, double* g, double* entries, double* full,
+                           int Part::*first) {
   if (report.fatal) return Status::callback_fatal;
   ++statistics_.jacobian_evaluations;
   if (g != nullptr) ++statistics_.value_evaluations;
   if (g != nullptr && gives_both_) ++statistics_.joint_evaluations;
-  const Part* at = nullptr;
   const char* what = "";
-  const int flag = guarded(
-      [&] {
-        for (const Part& part : parts_) {
-          at = &part;
-          const int failed = rows_of(part, t, y, n, scale, columns, place(part),
-                                     g != nullptr ? g + part.first_row : nullptr, &what);
-          if (failed != 0) return failed;
-        }
-        return 0;
-      },
-      thrown_);
-  if (flag != 0) return checked(flag, what, *at);
-  return g == nullptr ? Status::success : finite(t, g);
+  const Status status = each(what, [&](const Part& part) {
+    double* const C = part.sparse != nullptr
+                          ? entries + part.first_entry
+                          : full + static_cast<std::ptrdiff_t>(part.*first) * at.n;
+    return rows_of(part, at, C, g != nullptr ? g + part.first_row : nullptr, &what);
+  });
+  return status != Status::success || g == nullptr ? status : finite(at.t, g);
 }
 
-// Sparse rows are spread where all have been evaluated.
 Status Evaluator::jacobian(double t, const double* y, int n, const double* scale,
                            const std::vector<int>& columns, double* C, double* value) {
   std::fill(C, C + static_cast<std::ptrdiff_t>(rows_) * n, 0.0);
-  if (!has_sparse_)
-    return all_rows(t, y, n, scale, columns, value, [&](const Part& part) {
-      return C + static_cast<std::ptrdiff_t>(part.first_row) * n;
-    });
-  std::ptrdiff_t sparse = 0;
-  for (const Part& part : parts_) sparse += part.sparse != nullptr ? part.entries(n) : 0;
-  entries_.assign(static_cast<std::size_t>(sparse), 0.0);
-  double* entry = entries_.data();
+  std::fill(entries_.begin(), entries_.end(), 0.0);
   const Status status =
-      all_rows(t, y, n, scale, columns, value, [&, next = entry](const Part& part) mutable {
-        if (part.sparse == nullptr) return C + static_cast<std::ptrdiff_t>(part.first_row) * n;
-        double* const place = next;
-        next += part.entries(n);
-        return place;
-      });
+      all_rows({t, y, n, scale, columns}, value, entries_.data(), C, &Part::first_row);
+  if (has_sparse_) spread_entries(C, n);
+  return status;
+}
+
+void Evaluator::spread_entries(double* C, int n) const {
+  const double* entry = entries_.data();
   for (const Part& part : parts_) {
     if (part.sparse == nullptr) continue;
     for (int i = 0; i < part.set->count; ++i) {
@@ -223,27 +217,22 @@ Status Evaluator::jacobian(double t, const double* y, int n, const double* scale
         row[part.sparse->columns[static_cast<std::size_t>(e)]] = *entry++;
     }
   }
-  return status;
 }
 
 Status Evaluator::entries(double t, const double* y, int n, const double* scale,
                           const std::vector<int>& columns, double* entries, double* full,
                           double* value) {
-  return all_rows(t, y, n, scale, columns, value, [&](const Part& part) {
-    double*& next = part.sparse != nullptr ? entries : full;
-    double* const place = next;
-    next += part.entries(n);
-    std::fill(place, next, 0.0);
-    return place;
-  });
+  std::fill_n(entries, entries_.size(), 0.0);
+  std::fill_n(full, static_cast<std::ptrdiff_t>(full_rows_) * n, 0.0);
+  return all_rows({t, y, n, scale, columns}, value, entries, full, &Part::first_full);
 }
 
-int Evaluator::differences(const Part& part, double t, const double* y, int n, const double* scale,
-                           const std::vector<int>& columns, double* C) {
+int Evaluator::differences(const Part& part, const At& at, double* C) {
+  const auto [t, y, n, scale, columns] = at;
   const int m = part.set->count;
-  const auto evaluate = [&](const double* at, double* g) {
+  const auto evaluate = [&](const double* point, double* g) {
     ++statistics_.value_evaluations;
-    return value_of(part, t, at, n, g);
+    return value_of(part, at.t, point, at.n, g);
   };
 
   const double kRootEpsilon = std::sqrt(std::numeric_limits<double>::epsilon());

@@ -117,7 +117,7 @@ class Evaluator {
   int rows() const { return rows_; }
   /// So that value() on n unknowns never allocates.
   void reserve(int n) {
-    for (Part& part : parts_) part.g_room.reserve(part.set->count, std::max(part.set->count, n));
+    for (const Part& part : parts_) g_room_.reserve(part.set->count, std::max(part.set->count, n));
   }
   bool uses_differences() const { return uses_differences_; }
   /// Whether some rows have a function that gives g and C together.
@@ -142,12 +142,13 @@ class Evaluator {
   struct Part {
     const Constraints* set;
     int first_row;
+    int first_full;              // row, among those of sets that are not sparse
+    std::ptrdiff_t first_entry;  // among those of sparse sets
     const DenseJacobian* dense = std::get_if<DenseJacobian>(&set->jacobian);
     const SparseJacobian* sparse = std::get_if<SparseJacobian>(&set->jacobian);
     bool gives_both = (dense != nullptr && static_cast<bool>(dense->fill_with_value)) ||
                       (sparse != nullptr && static_cast<bool>(sparse->fill_with_value));
-    mutable bool C_checked = false;
-    mutable GuardedRoom g_room = {};
+    mutable bool g_checked = false, C_checked = false;  // the first evaluation is
     /// How many entries of C it has, on n unknowns.
     std::ptrdiff_t entries(int n) const {
       return sparse != nullptr ? static_cast<std::ptrdiff_t>(sparse->columns.size())
@@ -162,6 +163,15 @@ class Evaluator {
                  const std::function<void(int, int)>& found);
 
  private:
+  // Where C is wanted.
+  struct At {
+    double t;
+    const double* y;
+    int n;
+    const double* scale;
+    const std::vector<int>& columns;
+  };
+
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
   Status finite(double t, const double* g) {
@@ -170,29 +180,34 @@ class Evaluator {
     return std::isfinite(sum) ? Status::success : not_finite(t, g);
   }
   Status not_finite(double t, const double* g);
-  /// A callback that writes g, C (`entries` of it) or both, with room behind them for what it
-  /// writes too much, which ends the run. C, whose copy would cost, is checked the first time.
+  /// A callback that writes g, C (`entries` of it) or both. The first time there is room behind
+  /// them for what it writes too much, which ends the run.
   template <class Fill>
-  int write(const Part& part, int n, double* g, double* C, std::ptrdiff_t entries, Fill&& fill);
+  int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
+    const bool known = (g == nullptr || part.g_checked) && (C == nullptr || part.C_checked);
+    return known ? fill(g, C) : write_checked(part, n, g, C, std::forward<Fill>(fill));
+  }
+  template <class Fill>
+  int write_checked(const Part& part, int n, double* g, double* C, Fill&& fill);
+  /// call(part) for all sets, until one fails; `what` names the callback.
+  template <class Call>
+  Status each(const char*& what, Call&& call);
   // Calls the callbacks of one set; g and C are written to the places of the set.
   int value_of(const Part& part, double t, const double* y, int n, double* g);
-  int rows_of(const Part& part, double t, const double* y, int n, const double* scale,
-              const std::vector<int>& columns, double* C, double* g, const char** what);
-  int differences(const Part& part, double t, const double* y, int n, const double* scale,
-                  const std::vector<int>& columns, double* C);
-  /// The rows of all sets, the C of each at place(set).
-  template <class Place>
-  Status all_rows(double t, const double* y, int n, const double* scale,
-                  const std::vector<int>& columns, double* g, Place place);
+  int rows_of(const Part& part, const At& at, double* C, double* g, const char** what);
+  int differences(const Part& part, const At& at, double* C);
+  void spread_entries(double* C, int n) const;
+  /// The rows of all sets: sparse ones in `entries`, others from row part.*first of `full` on.
+  Status all_rows(const At& at, double* g, double* entries, double* full, int Part::*first);
 
   RowsReport own_;
   const Constraints& constraints_;
   Statistics& statistics_;
   std::vector<Part> parts_;
-  GuardedRoom C_room_;
+  GuardedRoom g_room_, C_room_;
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string thrown_;
-  int rows_ = 0;
+  int rows_ = 0, full_rows_ = 0;
   bool uses_differences_ = false, gives_both_ = false, has_sparse_ = false;
 };
 

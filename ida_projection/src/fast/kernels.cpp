@@ -36,6 +36,18 @@ Pair pair_at(const double* x) {
   std::memcpy(&pair, x, sizeof pair);
   return pair;
 }
+// Reads one element, or two.
+struct One {
+  static double at(const double* x) { return *x; }
+};
+struct Two {
+  static Pair at(const double* x) { return pair_at(x); }
+};
+double where_positive(double mask, double x) { return mask > 0.0 ? x : 0.0; }
+Pair where_positive(Pair mask, Pair x) {
+  using Bits = long long __attribute__((vector_size(16)));
+  return reinterpret_cast<Pair>((mask > Pair{0.0, 0.0}) & reinterpret_cast<Bits>(x));
+}
 
 /// The kernels for vectors of one length, or of any (Length 0).
 template <int Length>
@@ -49,26 +61,39 @@ struct Kernels {
     TETHER_ELEMENTWISE
     for (sunindextype i = 0; i < n; ++i) z[i] = f(i);
   }
+  /// Terms f(how to read, i) two at a time, their sum from the first to the last.
   template <class Function>
   static double sum(N_Vector X, Function f) {
     const sunindextype n = length(X);
     double total = 0.0;
-    for (sunindextype i = 0; i < n; ++i) total += f(i);
+    sunindextype i = 0;
+    for (; i + 1 < n; i += 2) {
+      const Pair two = f(Two(), i);
+      total += two[0];
+      total += two[1];
+    }
+    if (i < n) total += f(One(), i);
     return total;
   }
 
-  static void linear_sum(sunrealtype a, N_Vector X, sunrealtype b, N_Vector Y, N_Vector Z) {
-    const double *x = data(X), *y = data(Y);
+  /// use(f), f(x, y) = a x + b y as SUNDIALS rounds it.
+  template <class Use>
+  static void with_sum(sunrealtype a, sunrealtype b, Use use) {
     if (b == 1.0)
-      each(Z, [=](auto i) { return a * x[i] + y[i]; });
+      use([=](double x, double y) { return a * x + y; });
     else if (a == 1.0)
-      each(Z, [=](auto i) { return x[i] + b * y[i]; });
+      use([=](double x, double y) { return x + b * y; });
     else if (a == b && a != -1.0)
-      each(Z, [=](auto i) { return a * (x[i] + y[i]); });
+      use([=](double x, double y) { return a * (x + y); });
     else if (a == -b)
-      each(Z, [=](auto i) { return a * (x[i] - y[i]); });
+      use([=](double x, double y) { return a * (x - y); });
     else
-      each(Z, [=](auto i) { return a * x[i] + b * y[i]; });
+      use([=](double x, double y) { return a * x + b * y; });
+  }
+  static void linear_sum(sunrealtype a, N_Vector X, sunrealtype b, N_Vector Y, N_Vector Z) {
+    with_sum(a, b, [=](auto f) {
+      each(Z, [=, x = data(X), y = data(Y)](auto i) { return f(x[i], y[i]); });
+    });
   }
   static void constant(sunrealtype c, N_Vector Z) {
     each(Z, [=](auto) { return c; });
@@ -93,7 +118,9 @@ struct Kernels {
   }
 
   static sunrealtype dot(N_Vector X, N_Vector Y) {
-    return sum(X, [x = data(X), y = data(Y)](auto i) { return x[i] * y[i]; });
+    return sum(X, [x = data(X), y = data(Y)](auto read, auto i) {
+      return read.at(x + i) * read.at(y + i);
+    });
   }
   static sunrealtype minimum(N_Vector X) {
     const double* x = data(X);
@@ -102,8 +129,8 @@ struct Kernels {
     return least;
   }
   static double square_sum(N_Vector X, N_Vector W) {
-    return sum(X, [x = data(X), w = data(W)](auto i) {
-      const double share = x[i] * w[i];
+    return sum(X, [x = data(X), w = data(W)](auto read, auto i) {
+      const auto share = read.at(x + i) * read.at(w + i);
       return share * share;
     });
   }
@@ -114,9 +141,9 @@ struct Kernels {
 
   // Masked elements add 0, which changes no sum of squares.
   static sunrealtype wrms_norm_mask(N_Vector X, N_Vector W, N_Vector Mask) {
-    const double squares = sum(X, [x = data(X), w = data(W), mask = data(Mask)](auto i) {
-      const double share = x[i] * w[i], square = share * share;
-      return mask[i] > 0.0 ? square : 0.0;
+    const double squares = sum(X, [x = data(X), w = data(W), m = data(Mask)](auto read, auto i) {
+      const auto share = read.at(x + i) * read.at(w + i);
+      return where_positive(read.at(m + i), share * share);
     });
     return root(squares / static_cast<double>(length(X)));
   }
@@ -186,7 +213,10 @@ struct Kernels {
 
   static int linear_sums(int count, sunrealtype a, N_Vector* X, sunrealtype b, N_Vector* Y,
                          N_Vector* Z) {
-    for (int k = 0; k < count; ++k) linear_sum(a, X[k], b, Y[k], Z[k]);
+    with_sum(a, b, [=](auto f) {
+      for (int k = 0; k < count; ++k)
+        each(Z[k], [=, x = data(X[k]), y = data(Y[k])](auto i) { return f(x[i], y[i]); });
+    });
     return 0;
   }
   static int scale_each(int count, sunrealtype* c, N_Vector* X, N_Vector* Z) {

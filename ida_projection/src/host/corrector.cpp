@@ -21,30 +21,18 @@ bool Corrector::is_reached_by(const Ida& ida) {
 int Corrector::initialize() {
   failures_in_row_ = 0;
   rounding_fails_ = false;
+  rounding_.clear();
+  expect_followers(nullptr);
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
-void Corrector::begin(void* mem) {
-  mem_ = mem;
-  stop_flag_ = 0;
-}
-
-int Corrector::correct(const Candidate& candidate, double tolerance, bool call_setup,
-                       const std::vector<int>& rounding) {
-  N_Vector weights = candidate.weights;
-  if (rounding_fails_ && !rounding.empty()) {
-    if (!weights_) weights_ = OwnedVector(weights);
-    N_VScale(1.0, weights, weights_);
-    double* entries = N_VGetArrayPointer(weights_);
-    for (const int j : rounding) entries[j] = 0.0;
-    weights = weights_;
-  }
-  const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction, weights,
-                                     tolerance, call_setup, mem_);
-  SUNNonlinSolGetNumIters(inner_, &iterations_);
-  failures_in_row_ = flag == 0 ? 0 : failures_in_row_ + 1;
-  if (failures_in_row_ >= 2) rounding_fails_ = true;
-  return flag;
+// Without those that rounding fails.
+N_Vector Corrector::reduced(N_Vector weights) {
+  if (!weights_) weights_ = OwnedVector(weights);
+  N_VScale(1.0, weights, weights_);
+  double* entries = N_VGetArrayPointer(weights_);
+  for (const int j : rounding_) entries[j] = 0.0;
+  return weights_;
 }
 
 // Allocates all that test_convergence() needs. It is called through C functions of SUNDIALS and

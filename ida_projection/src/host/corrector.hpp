@@ -33,13 +33,25 @@ class Corrector {
 
   int initialize();  ///< a new run starts
   /// A new attempt; `mem`: IDA's memory in it.
-  void begin(void* mem);
-  /// Computes the correction of the candidate. If it fails although IDA has already cut the step
-  /// for that, the convergence test from then on leaves out `rounding`: algebraic variables of
-  /// index 2 or more. Their rounding, divided by the step, fails the test, and no other variable
-  /// depends on them.
-  int correct(const Candidate& candidate, double tolerance, bool call_setup,
-              const std::vector<int>& rounding);
+  void begin(void* mem) {
+    mem_ = mem;
+    stop_flag_ = 0;
+  }
+  /// Computes the correction of the candidate.
+  int correct(const Candidate& candidate, double tolerance, bool call_setup) {
+    const bool whole = !rounding_fails_ || rounding_.empty();
+    const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction,
+                                       whole ? candidate.weights : reduced(candidate.weights),
+                                       tolerance, call_setup, mem_);
+    SUNNonlinSolGetNumIters(inner_, &iterations_);
+    failures_in_row_ = flag == 0 ? 0 : failures_in_row_ + 1;
+    if (failures_in_row_ >= 2) rounding_fails_ = true;
+    return flag;
+  }
+  /// If corrections fail although IDA has already cut the step for that, the convergence test from
+  /// then on leaves out these algebraic variables of index 2 or more, in this run. Their rounding,
+  /// divided by the step, fails the test, and no other variable depends on them.
+  void leave_out(const std::vector<int>& rounding) { rounding_ = rounding; }
   /// `differential`: 1 for differential variables, 0 for followers; null: there are no followers.
   /// When the former have converged and followers still move, IDA's test waits instead of failing.
   void expect_followers(N_Vector differential);
@@ -73,6 +85,7 @@ class Corrector {
   static int test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                               sunrealtype tolerance, N_Vector weights, void* self);
   int install_convergence_test();
+  N_Vector reduced(N_Vector weights);
   bool followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights);
 
   SUNNonlinSolConvTestFn test_ = nullptr;  // IDA's
@@ -82,6 +95,7 @@ class Corrector {
   long iterations_ = 0;
   int failures_in_row_ = 0;
   bool rounding_fails_ = false;
+  std::vector<int> rounding_;
   OwnedVector weights_;  // without those that rounding fails
 };
 

@@ -13,6 +13,15 @@ struct StepData {
   N_Vector y = nullptr;  ///< as F was evaluated last or, after the corrector, as it is accepted
 };
 
+/// IDA's counts and the step that it tries.
+struct IntegratorData {
+  double t = 0.0, cj = 0.0;
+  long steps = 0;  ///< accepted
+  long error_test_failures = 0;
+  double h = 0.0;
+  int order = 1;
+};
+
 /// The host's ida_mem, not owned.
 class Ida {
  public:
@@ -21,7 +30,6 @@ class Ida {
   void* mem() const { return mem_; }
   long steps() const { return count(IDAGetNumSteps); }
   long setups() const { return count(IDAGetNumLinSolvSetups); }
-  long error_test_failures() const { return count(IDAGetNumErrTestFails); }
   /// Evaluations of F for one Jacobian by differences; 0 where the caller gives it, or none is
   /// made.
   long evaluations_for_jacobian() const {
@@ -33,10 +41,18 @@ class Ida {
     IDAGetCurrentStep(mem_, &h);
     return h;
   }
-  int order() const {
-    int k = 0;
-    IDAGetCurrentOrder(mem_, &k);
-    return k;
+  IntegratorData integrator() const {
+    IntegratorData data;
+    long evaluations, setups;
+    int last_order;
+    sunrealtype first_h, last_h, h = 0.0, t = 0.0, cj = 0.0;
+    IDAGetIntegratorStats(mem_, &data.steps, &evaluations, &setups, &data.error_test_failures,
+                          &last_order, &data.order, &first_h, &last_h, &h, &t);
+    IDAGetCurrentCj(mem_, &cj);
+    data.t = t;
+    data.cj = cj;
+    data.h = h;
+    return data;
   }
   StepData step() const {
     StepData step;

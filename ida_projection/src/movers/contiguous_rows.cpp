@@ -7,10 +7,9 @@
 #include <utility>
 
 #include "host/mechanisms.hpp"
-#include "host/rounding.hpp"
 #include "host/shortest.hpp"
 #include "movers/local_metric.hpp"
-#include "movers/rows_at.hpp"
+#include "movers/newton.hpp"
 #include "rows/row_levels.hpp"
 #include "rows/split_rows.hpp"
 
@@ -27,16 +26,14 @@ constexpr double kAlong = 1e-3;    // of y, for differences along s
 
 double square(double x) { return x * x; }
 
-class ContiguousRows final : public RowsAt {
+class ContiguousRows final : public Newton<ContiguousRows> {
  public:
   ContiguousRows(const Constraints& constraints, const Options& options, Statistics& statistics,
                  int size, bool sparse, int reported)
-      : RowsAt(Kind::entries),
+      : Newton(Kind::entries, options, statistics),
         evaluator_(constraints, statistics, &report),
         rows_(constraints, evaluator_, size, sparse),
         metric_(options, size),
-        options_(options),
-        statistics_(statistics),
         reported_(static_cast<std::size_t>(reported >= 0 ? reported : evaluator_.rows())),
         inverse_n_(1.0 / size),
         y_(static_cast<std::size_t>(size), 0.0),
@@ -54,8 +51,9 @@ class ContiguousRows final : public RowsAt {
     const Status status =
         both ? rows(t, g_.data()) : evaluator_.value(t, y_.data(), unknowns(), g_.data());
     rows_known_ = both && status == Status::success;
-    drift = 0.0;
-    for (std::size_t i = 0; i < reported_; ++i) drift = std::max(drift, std::abs(g_[i]));
+    double largest = 0.0;
+    for (std::size_t i = 0; i < reported_; ++i) largest = std::max(largest, std::abs(g_[i]));
+    drift = largest;
     return status;
   }
   Status factor(double t, bool refill) override {
@@ -66,8 +64,9 @@ class ContiguousRows final : public RowsAt {
     }
     rows_known_ = false;
     t_ = t;
-    const bool known = in_use(Mechanism::kept_rank) && lasting_ && factors != Factors::none;
-    if (!known || !rows_.factor_kept()) return decide(t);
+    if (!in_use(Mechanism::kept_rank) || !lasting_ || factors == Factors::none ||
+        !rows_.factor_kept())
+      return decide(t);
     thin_ = false;
     ++statistics_.refactorizations;
     return Status::success;
@@ -126,7 +125,7 @@ class ContiguousRows final : public RowsAt {
     });
     return learns ? learn_trust(length_) : Status::success;
   }
-  bool is_rounding(double move) override {
+  bool is_rounding(double move = kAnyMove) override {
     if (std::isfinite(move)) return move <= rounding_length();
     for (std::size_t i = 0; i < g_.size(); ++i)
       if (!(std::abs(g_[i]) <= kRoundingOfTerms * rows_.C().terms(static_cast<int>(i), y_.data())))
@@ -152,7 +151,7 @@ class ContiguousRows final : public RowsAt {
         [&](int, int j) { sum += square(at_.correction_entries[j] * at_.weight_entries[j]); });
     return wrms(sum);
   }
-  bool contradicts() override { return rows_.drops_rows() && rows_.contradict(WT()); }
+  bool contradicts() override { return drops_rows() && rows_.contradict(WT()); }
   void refresh_pattern_soon() override { rows_.refresh_pattern_soon(); }
 
   Status set_algebraic(const Candidate& candidate, N_Vector id) override {
@@ -161,7 +160,7 @@ class ContiguousRows final : public RowsAt {
     return structure(candidate.t, id);
   }
   void accept() override { metric_.accept(); }
-  void reset() override {
+  void forget() {
     factors = Factors::none;
     metric_.reset();
     rows_.trust.reset();
@@ -218,7 +217,7 @@ class ContiguousRows final : public RowsAt {
     return rows_.evaluate(t, y_.data(), WT().data(), nullptr, [this] { factors = Factors::none; });
   }
   Status factor_in(N_Vector D) override {
-    rows_.set_metric(N_VGetArrayPointer(D));
+    rows_.set_metric([of = N_VGetArrayPointer(D)](int j) { return of[j]; });
     if (factors == Factors::of_all_rows && rows_.factor_kept()) {
       ++statistics_.refactorizations;
       return Status::success;
@@ -258,8 +257,14 @@ class ContiguousRows final : public RowsAt {
 
  private:
   int unknowns() const { return static_cast<int>(y_.size()); }
+  bool drops_rows() const { return factors != Factors::of_all_rows && rows_.drops_rows(); }
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
-  void fill_metric() { rows_.set_metric(metric_.find(at_).data()); }
+  void fill_metric() {
+    if (metric_.find(at_))
+      rows_.set_metric([this](int j) { return metric_.D(static_cast<std::size_t>(j)); });
+    else
+      rows_.set_metric([D = metric_.D().data()](int j) { return D[j]; });
+  }
   void place(const Candidate& candidate) {
     at_ = candidate;
     add(at_.base_entries, at_.correction_entries, unknowns(), y_.data());
@@ -331,7 +336,7 @@ class ContiguousRows final : public RowsAt {
     linalg::MinimumNorm& solver = rows_.counted().dense;
     const int all = solver.rank(), firm = RowTrust::firm_rows(solver);
     if (rows_.trust.trusted_rows(solver, length) == all) return length;
-    const bool whole = !rows_.drops_rows();
+    const bool whole = !rows_.drops_rows();  // the solver's rank is that of all rows here
     const double firm_length = length_with(firm);
     solver.use_rank(all);
     const int trusted = rows_.trust.trusted_rows(solver, firm_length);
@@ -344,7 +349,7 @@ class ContiguousRows final : public RowsAt {
   // while they depend on these. If they ask for a longer move than when they were dropped, one of
   // them may have become independent.
   bool dropped_follow() {
-    if (rows_.C().sparse() || !rows_.drops_rows()) return true;
+    if (!drops_rows() || rows_.C().sparse()) return true;
     const double left = rows_.left_of_dropped(WT());
     if (decided_) usual_ = left;
     return decided_ || left <= std::max(kFollows * options_.advanced.tolerance, 2.0 * usual_) ||
@@ -427,8 +432,6 @@ class ContiguousRows final : public RowsAt {
   Evaluator evaluator_;
   SplitRows rows_;
   LocalMetric metric_;
-  const Options& options_;
-  Statistics& statistics_;
   std::size_t reported_;  // the others are equations of F
   double inverse_n_;
   Candidate at_{};
@@ -447,6 +450,19 @@ class ContiguousRows final : public RowsAt {
 };
 
 }  // namespace
+
+std::unique_ptr<RowsAt> make_rows(const Constraints& constraints, const Options& options,
+                                  Statistics& statistics, N_Vector like, int reported) {
+  if (has_values(constraints)) {
+    const int size = static_cast<int>(N_VGetLength(like));
+    return make_contiguous_rows(constraints, options, statistics, size,
+                                wants_sparse_factors(constraints, size), reported);
+  }
+  MakeRows make = make_user_rows;
+  if (const auto* rows = std::get_if<Gradients>(&constraints.jacobian)) make = rows->make;
+  if (const auto* rows = std::get_if<DistributedRows>(&constraints.jacobian)) make = rows->make;
+  return make(constraints, options, statistics, like);
+}
 
 std::unique_ptr<RowsAt> make_contiguous_rows(const Constraints& constraints, const Options& options,
                                              Statistics& statistics, int size, bool sparse,

@@ -23,31 +23,33 @@ class LocalMetric {
         trial_scale_(scale_),
         D_(scale_) {}
 
-  /// Updates s with the present candidate, which accept() keeps, and D of every component: from s
-  /// or, by the option, WT.
-  const std::vector<double>& find(const Candidate& at) {
-    const bool local = options_.advanced.metric == Metric::local_correction;
+  /// Updates s with the present candidate, which accept() keeps. True: each D_i follows from its s
+  /// alone, D(i); else all of D().
+  bool find(const Candidate& at) {
     const std::size_t n = scale_.size();
-    double* __restrict D = D_.data();
     double* __restrict trial = trial_scale_.data();
     const double* __restrict scale = scale_.data();
-    const double* __restrict w = at.weight_entries;
     const double* __restrict ycor = at.correction_entries;
-    for (std::size_t i = 0; i < n; ++i) {
-      const double s = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
-      trial[i] = s;
-      // A component without a weight (WT = 0) has the corrector's change as its scale.
-      const double weighted = 1.0 / (w[i] > 0.0 ? w[i] : 1.0);
-      const double weight = w[i] > 0.0 ? weighted : s;
-      D[i] = local ? std::max(s, kMetricFloor * weight) : weight;
-    }
+    for (std::size_t i = 0; i < n; ++i)
+      trial[i] = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
+    weights_ = at.weight_entries;
     const std::vector<int>& groups = levels_.empty() ? options_.group : levels_;
+    const bool local = options_.advanced.metric == Metric::local_correction;
+    if (local && groups.empty() && !by_rates()) return true;
+    // A component without a weight (WT = 0) has the corrector's change as its scale.
+    for (std::size_t i = 0; i < n; ++i)
+      D_[i] = local ? D(i) : weights_[i] > 0.0 ? 1.0 / weights_[i] : trial[i];
     if (local && !groups.empty())
-      share(w, groups);
-    else if (local && by_rates())
+      share(weights_, groups);
+    else if (local)
       limit(at.h);
-    return D_;
+    return false;
   }
+  double D(std::size_t i) const {
+    const double s = trial_scale_[i], w = weights_[i];
+    return std::max(s, kMetricFloor * (w > 0.0 ? 1.0 / w : s));
+  }
+  const std::vector<double>& D() const { return D_; }
   /// One scale for each of these groups, in place of Options::group; empty: no longer.
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
   /// Unknowns of level 1 are the rates of those of level 0: scales obey that from now on, see
@@ -63,6 +65,10 @@ class LocalMetric {
   }
 
  private:
+  // A component without a weight (WT = 0) has the corrector's change as its scale.
+  void use_weights(const double* w) {
+    for (std::size_t i = 0; i < D_.size(); ++i) D_[i] = w[i] > 0.0 ? 1.0 / w[i] : trial_scale_[i];
+  }
   // One scale for each group: rms of |correction| in tolerances over its members.
   void share(const double* w, const std::vector<int>& group) {
     const auto groups = static_cast<std::size_t>(1 + *std::max_element(group.begin(), group.end()));
@@ -100,6 +106,7 @@ class LocalMetric {
 
   const Options& options_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
+  const double* weights_ = nullptr;          // of that candidate
   std::vector<double> D_;
   std::vector<int> levels_, levels_of_rates_;
   std::vector<double> group_sum_;

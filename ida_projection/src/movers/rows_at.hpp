@@ -23,6 +23,17 @@ struct Tangency {
   std::vector<double> tolerance;  ///< |row_i(C WT)|, a move of one tolerance
 };
 
+struct Move {
+  Status status = Status::unused;
+  double length = 0.0;        ///< WRMS length of the whole move, in tolerances
+  double drift_before = 0.0;  ///< largest |g_i| at the candidate
+  int moves = 0;              ///< Newton moves made
+  double floor = 0.0;         ///< measure(): length that rounding of y alone explains
+  bool not_needed = false;    ///< no move was needed, which g and earlier factors have shown
+  bool capped = false;
+  double left = 0.0;  ///< of a capped move: what it lacks, in tolerances
+};
+
 /// The move dy for the present g by the current factors.
 struct Solution {
   Status status = Status::success;
@@ -40,13 +51,16 @@ enum class Solve {
   point   ///< a point far away is looked for: all unknowns count
 };
 
-/// g, C and its factors for the candidate that was loaded last. Newton's loop is about six of these
-/// functions, and the data that they leave.
+/// Rows that points are moved onto: g, C and its factors for the candidate that was loaded last,
+/// and Newton's method by these (newton.hpp), which is about six of the functions and the data that
+/// they leave. The notation is that of docs/method/projection.md: N unknowns, m rows, C = dg/dy, D
+/// the metric, WT = 1/w the error weights, s the size of the corrector's changes.
 class RowsAt {
  public:
   /// How the rows are given. A projection of the caller's own has no g and is one solution.
   enum class Kind { entries, vectors, projection };
   enum class Factors { none, of_some_rows, of_all_rows };
+  static constexpr double kAnyMove = std::numeric_limits<double>::infinity();
 
   explicit RowsAt(Kind of_rows) : kind(of_rows) {}
   virtual ~RowsAt() = default;
@@ -57,6 +71,19 @@ class RowsAt {
   RowsReport report;
   double drift = 0.0;  ///< largest |g_i| as evaluated last
   Factors factors = Factors::none;
+  int age = 0;  ///< of C and factors, in candidates that were tested with them
+
+  /// A new run starts.
+  virtual void reset() = 0;
+  /// Length of the first Newton move from the candidate; the candidate is not changed.
+  virtual Move measure(const Candidate& candidate) = 0;
+  /// Moves the candidate: correction <- correction - dy.
+  virtual Move move(const Candidate& candidate) = 0;
+  /// After a successful move() the correction was changed by `change`: removes what this changes in
+  /// g, with the current factors.
+  virtual Status settle(const Candidate& candidate, N_Vector change) = 0;
+  /// Largest |g_i| at the present candidate; -1 if g cannot be evaluated.
+  virtual double remaining_drift(const Candidate& candidate) = 0;
 
   /// Loads y = base + correction. `refills`: factor() in the metric of this candidate follows; else
   /// only its scale is updated.
@@ -70,7 +97,7 @@ class RowsAt {
   virtual Status apply(double share, const Candidate& candidate) = 0;
   /// Whether rounding explains a move of this length, by the factors; of any length: every g_i, by
   /// its own terms.
-  virtual bool is_rounding(double move = std::numeric_limits<double>::infinity()) = 0;
+  virtual bool is_rounding(double move = kAnyMove) = 0;
 
   /// y follows the correction, which has changed by `change` (null: by anything). Returns the
   /// length of the change over the variables of the error test, in tolerances.
@@ -88,7 +115,6 @@ class RowsAt {
   }
   /// The attempt that used the last candidate was accepted: its scale is kept.
   virtual void accept() {}
-  virtual void reset() {}
   /// From the next move on: one scale for all unknowns of a level (row_levels.hpp), or a scale for
   /// each unknown. Returns false if there are too few rows or levels.
   virtual bool use_levels(bool) { return false; }

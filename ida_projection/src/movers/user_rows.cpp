@@ -1,19 +1,17 @@
 // Tether: a projection that the caller does himself. SPDX-License-Identifier: BSD-3-Clause
 #include "host/owned_vector.hpp"
-#include "movers/rows_at.hpp"
+#include "movers/newton.hpp"
 
 namespace tether::ida_projection {
 
 namespace {
 
-class UserRows final : public RowsAt {
+class UserRows final : public Newton<UserRows> {
  public:
   UserRows(const Constraints& constraints, const Options& options, Statistics& statistics,
            N_Vector like)
-      : RowsAt(Kind::projection),
+      : Newton(Kind::projection, options, statistics),
         user_(std::get<UserProjection>(constraints.jacobian)),
-        options_(options),
-        statistics_(statistics),
         y_(like),
         change_(like),
         error_(like) {}
@@ -44,16 +42,15 @@ class UserRows final : public RowsAt {
     N_VLinearSum(1.0, candidate.correction, share, change_, candidate.correction);
     return Status::success;
   }
-  bool is_rounding(double) override { return false; }
+  bool is_rounding(double = kAnyMove) override { return false; }
   double follow(const Candidate&, N_Vector change) override {
     return change != nullptr ? N_VWrmsNorm(change, at_.weights) : 0.0;
   }
   double corrected() const override { return N_VWrmsNorm(at_.correction, at_.weights); }
+  void forget() {}
 
  private:
   UserProjection user_;
-  const Options& options_;
-  Statistics& statistics_;
   Candidate at_{};
   OwnedVector y_, change_, error_;
 };

@@ -111,16 +111,12 @@ StoredRows::StoredRows(const Evaluator& evaluator, int n, bool sparse) : n_(n), 
   seen_.assign(values_.size(), 0);
 }
 
-Status StoredRows::evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
-                            const std::vector<int>& columns, double* g) {
-  if (sparse_)
-    return evaluator.entries(t, y, n_, WT, columns, values_.data(),
-                             values_.data() + columns_.size(), g);
-  return evaluator.jacobian(t, y, n_, WT, columns, values_.data(), g);
-}
-
 void StoredRows::notice_all() {
   for (std::size_t e = 0; e < seen_.size(); ++e) seen_[e] |= values_[e] != 0.0;
+}
+
+bool StoredRows::has_seen(const std::vector<std::size_t>& entries) const {
+  return std::any_of(entries.begin(), entries.end(), [this](std::size_t e) { return seen_[e]; });
 }
 
 // Checks all entries without a branch for each, since hardly ever one has changed.
@@ -129,7 +125,7 @@ bool StoredRows::notice(const std::vector<std::size_t>& entries) {
   for (const std::size_t e : entries) {
     std::uint64_t entry;
     std::memcpy(&entry, &values_[e], sizeof entry);
-    bits |= (entry << 1) | static_cast<std::uint64_t>(seen_[e]);  // but for the sign
+    bits |= entry << 1;  // but for the sign
   }
   if (bits == 0) return false;
   for (const std::size_t e : entries) seen_[e] |= values_[e] != 0.0;
@@ -340,9 +336,8 @@ void SplitRows::watch() {
   }
 }
 
-Status SplitRows::evaluate_once(double t, const double* y, const double* WT, double* g) {
-  const Status status = C_.evaluate(evaluator_, t, y, WT, columns_, g);
-  if (status != Status::success || !structured_) return status;
+// Whether entries of C that was evaluated at y ask for other blocks.
+void SplitRows::inspect(double t, const double* y, const double* WT) {
   for (const int i : mixed_) {
     double squares[2] = {0.0, 0.0};  // of the differential and the algebraic part, in tolerances
     C_.visit(i, [&](int j, double c) {
@@ -354,13 +349,13 @@ Status SplitRows::evaluate_once(double t, const double* y, const double* WT, dou
     outgrown_ |= lost != (without != 0);
     without = lost ? 1 : 0;
   }
-  if (watched_.empty()) return status;
+  if (watched_.empty()) return;
   if (evaluator_.uses_differences() && ++evaluations_ >= next_refresh_) {
     next_refresh_ = std::max(kFirstRefresh, 2 * evaluations_);
     evaluator_.sensitive(t, y, n_, WT, [this](int i, int j) { C_.notice(i, j); });
+    outgrown_ |= C_.has_seen(watched_);
   }
   outgrown_ |= C_.notice(watched_);
-  return status;
 }
 
 Status SplitRows::learn_trust(double t, const double* y, const double* WT, double length) {
@@ -378,17 +373,7 @@ bool SplitRows::factor() {
          (a.rows.empty() || a.factor(C_, n_, rank_tolerance_));
 }
 
-bool SplitRows::factor_kept() {
-  const auto kept = [this](Block& block) {
-    return block.rows.empty() ||
-           block.dense.factor_kept(C_.values().data(), n_, block.rows.data(), block.columns.data());
-  };
-  return !C_.sparse() && kept(d) && kept(a);
-}
-
-void SplitRows::solve(const std::vector<double>& g) {
-  if (a.rows.empty() && !d.sparse)
-    return d.dense.solve(g.data(), d.dy.data());  // d has every row, in order
+void SplitRows::solve_blocks(const std::vector<double>& g) {
   for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
   d.solve();
   if (a.rows.empty()) return;

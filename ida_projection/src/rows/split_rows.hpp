@@ -54,13 +54,17 @@ class StoredRows {
 
   /// C at y; differences visit `columns`. g: null, or receives the values, too.
   Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
-                  const std::vector<int>& columns, double* g);
+                  const std::vector<int>& columns, double* g) {
+    return sparse_ ? evaluator.entries(t, y, n_, WT, columns, values_.data(),
+                                       values_.data() + columns_.size(), g)
+                   : evaluator.jacobian(t, y, n_, WT, columns, values_.data(), g);
+  }
   void forget_seen() { seen_.assign(values_.size(), 0); }
   void notice(int i, int j) { seen_[static_cast<std::size_t>(row(i).begin + j)] = 1; }
   void notice_all();
-  /// Records which of these entries are not zero. Returns whether any is, or one that was recorded
-  /// as constant has changed.
+  /// Records which of these entries, unseen so far, are not zero. Returns whether any is.
   bool notice(const std::vector<std::size_t>& entries);
+  bool has_seen(const std::vector<std::size_t>& entries) const;
 
  private:
   struct Row {
@@ -74,7 +78,7 @@ class StoredRows {
   std::vector<Row> rows_;
   std::vector<int> columns_;    // of the entries of sparse rows, which come first
   std::vector<double> values_;  // C
-  std::vector<char> seen_;      // not to be zero, or not to be constant
+  std::vector<char> seen_;      // not to be zero
 };
 
 /// One set of rows solved for one set of columns, by dense factors or by sparse ones.
@@ -111,6 +115,10 @@ struct Block {
   void set_up(const StoredRows& C, int n);
   /// From C and the metric in D(). False: an entry is not finite.
   bool factor(const StoredRows& C, int n, double rank_tolerance);
+  /// The same with the rows that the last factor() has kept, by dense factors. False: it is due.
+  bool factor_kept(const StoredRows& C, int n) {
+    return rows.empty() || dense.factor_kept(C.values().data(), n, rows.data(), columns.data());
+  }
   void solve();
 };
 
@@ -147,26 +155,37 @@ class SplitRows {
   /// belongs to another block or to none, the rows are arranged anew: `rearranged()` then fills D.
   template <class Rearranged>
   Status evaluate(double t, const double* y, const double* WT, double* g, Rearranged rearranged) {
-    const Status status = evaluate_once(t, y, WT, g);
-    if (status != Status::success || !outgrown_) return status;
+    const Status status = C_.evaluate(evaluator_, t, y, WT, columns_, g);
+    if (status != Status::success || !structured_ || (mixed_.empty() && watched_.empty()))
+      return status;
+    inspect(t, y, WT);
+    if (!outgrown_) return status;
     rearrange();
     rearranged();
-    return evaluate_once(t, y, WT, nullptr);
+    const Status again = C_.evaluate(evaluator_, t, y, WT, columns_, nullptr);
+    if (again == Status::success) inspect(t, y, WT);
+    return again;
   }
   /// A move failed: perhaps entries of C are missing that g could not fill before.
   void refresh_pattern_soon() { next_refresh_ = 0; }
   /// D of all unknowns, for the next factor().
-  void set_metric(const double* D) {
-    for_blocks([D](Block& block) {
-      block.for_columns([D, to = block.D()](int k, int j) { to[k] = D[j]; });
+  template <class Metric>
+  void set_metric(Metric D) {
+    for_blocks([&D](Block& block) {
+      block.for_columns([&D, to = block.D()](int k, int j) { to[k] = D(j); });
     });
   }
   /// From C and the metric. False: an entry is not finite.
   bool factor();
   /// The same with the rows that the last factor() has kept. False: it is due.
-  bool factor_kept();
+  bool factor_kept() { return !C_.sparse() && d.factor_kept(C_, n_) && a.factor_kept(C_, n_); }
   /// d.dy and a.dy for the values g, with the C that was factored.
-  void solve(const std::vector<double>& g);
+  void solve(const std::vector<double>& g) {
+    if (a.rows.empty() && !d.sparse)
+      d.dense.solve(g.data(), d.dy.data());  // d has every row, in order
+    else
+      solve_blocks(g);
+  }
   bool drops_rows() const;
   /// dy of every column that moves.
   template <class Body>
@@ -187,7 +206,8 @@ class SplitRows {
   bool contradict(const std::vector<double>& WT);
 
  private:
-  Status evaluate_once(double t, const double* y, const double* WT, double* g);
+  void inspect(double t, const double* y, const double* WT);
+  void solve_blocks(const std::vector<double>& g);
   Status find_seen(double t, const std::vector<double>& y, const std::vector<double>& WT);
   void rearrange();
   void split();

@@ -168,9 +168,8 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   restore_weights(weights);
   polish_->begin();
   corrector_->begin(mem);
-  static const std::vector<int> none;
   const Candidate candidate{0.0, predicted, correction, weights};
-  int flag = corrector_->correct(candidate, tolerance, call_setup, none);
+  int flag = corrector_->correct(candidate, tolerance, call_setup);
   const StepData step = state_.ida_.step();
   note_setups(step.cj);
   if (flag != 0) return flag;
@@ -184,7 +183,7 @@ int SensitivityCorrector::solve(N_Vector predicted, N_Vector correction, N_Vecto
   if (status == Status::success && fix == Fix::misled && !call_setup && corrector_->has_setup()) {
     // As for the state: a stale Jacobian fooled IDAS' convergence test.
     N_VConst(0.0, correction);
-    flag = corrector_->correct(candidate, tolerance, true, none);
+    flag = corrector_->correct(candidate, tolerance, true);
     note_setups(step.cj);
     if (flag != 0) return flag;
     status = move_and_polish(candidate, step, tolerance, fix);
@@ -216,8 +215,8 @@ void SensitivityCorrector::restore_weights(N_Vector weights) {
 
 // The rows, the variables and the metric that move the state.
 void SensitivityCorrector::use_rows_of_state() {
-  const Constraints* rows = state_.movers_.joined.mover() != nullptr
-                                ? &state_.movers_.joined.constraints()
+  const Constraints* rows = state_.rows_.joined.rows() != nullptr
+                                ? &state_.rows_.joined.constraints()
                                 : &state_.constraints_;
   if (moved_ != rows || !rows_) {
     moved_ = rows;
@@ -246,7 +245,7 @@ void SensitivityCorrector::note_setups(double cj) {
 Status SensitivityCorrector::evaluate(const StepData& step) {
   y_ = step.y;
   IDAGetErrWeights(state_.ida_.mem(), weights_);
-  N_Vector id = state_.engaged() ? state_.movers_.joined.moved_id() : nullptr;
+  N_Vector id = state_.engaged() ? state_.rows_.joined.moved_id() : nullptr;
   return rows_->linearise(step.t, y_, weights_, id);
 }
 
@@ -319,7 +318,7 @@ Status SensitivityCorrector::move_and_polish(const Candidate& candidate, const S
                                              double tolerance, Fix& fix) {
   double length = 0.0;
   Status status = find_moves(candidate, step.t, true, &length);
-  if (moved_ != &state_.constraints_) state_.movers_.joined.restore_ida();
+  if (moved_ != &state_.constraints_) state_.rows_.joined.restore_ida();
   if (status != Status::success) return status;
   if (!engaged_) {
     const double floor = 4.0 * kEpsilon * N_VWrmsNorm(candidate.base, candidate.weights);

@@ -45,7 +45,7 @@ ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v
 
 void Projection::Impl::project_sensitivities(Sensitivities given,
                                              const tether_idas_functions& idas) {
-  if (movers_.used == nullptr) return;  // no constraints
+  if (rows_.used == nullptr) return;  // no constraints
   const std::string misused = why_misused("project_sensitivities", {});
   if (!misused.empty()) reject(misused);
   sensitivities_ = std::make_unique<SensitivityCorrector>(*this, std::move(given), idas);
@@ -56,7 +56,7 @@ ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_V
                                                                   N_Vector* sp) {
   ConsistencyReport report;
   report.status = Status::success;
-  if (movers_.used == nullptr) return report;
+  if (rows_.used == nullptr) return report;
   if (!sensitivities_)
     reject("make_sensitivities_consistent: call project_sensitivities before, which knows dg/dp");
   if (yy == nullptr || yp == nullptr || s == nullptr)
@@ -76,7 +76,7 @@ ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Ve
   ConsistencyReport report;
   report.status = Status::success;
   if (yy == nullptr || v == nullptr) reject("project_gradient: yy and v must not be null");
-  if (movers_.used == nullptr) return report;
+  if (rows_.used == nullptr) return report;
   if (std::holds_alternative<UserProjection>(constraints_.jacobian))
     reject("project_gradient: a UserProjection tells no C; give the rows");
   if (std::holds_alternative<DistributedRows>(constraints_.jacobian))

@@ -8,7 +8,7 @@
 
 #include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 
 namespace tether::ida_projection {
 

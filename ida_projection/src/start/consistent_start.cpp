@@ -135,7 +135,7 @@ std::string ConsistentStart::answer(Candidate& candidate) {
   N_VScale(1.0, candidate.weights, weights_);
   std::string advice = variables_.derive(candidate, corrector_);
   joined_.join(candidate);
-  if (joined_.mover() != nullptr) {
+  if (joined_.rows() != nullptr) {
     PointProjection point(joined_.constraints(), options_);
     point.project(inquiry_->t, inquiry_->y, inquiry_->hold, joined_.moved_id(), weights_,
                   inquiry_->report);

@@ -25,7 +25,7 @@ bool JoinedRows::residual_at(const double* y, double* f) {
 }
 
 void JoinedRows::forget() {
-  mover_.reset();
+  rows_.reset();
   moved_id_ = OwnedVector();
 }
 
@@ -55,9 +55,8 @@ void JoinedRows::join(const Candidate& candidate) {
   if (found.equations.empty()) return;
   joined_ = constraints_ + as_constraints(
                                found, residual, [this] { return present_.weight_entries; }, size);
-  mover_ = std::make_unique<Mover>(
-      options_, make_rows(joined_, options_, statistics_, candidate.base, rows.rows()));
-  mover_->reset();
+  rows_ = make_rows(joined_, options_, statistics_, candidate.base, rows.rows());
+  rows_->reset();
 }
 
 }  // namespace tether::ida_projection

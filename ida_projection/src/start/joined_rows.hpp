@@ -5,7 +5,7 @@
 
 #include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 #include "start/algebraic.hpp"
 
 namespace tether::ida_projection {
@@ -31,7 +31,7 @@ class JoinedRows {
   /// the joined equations evaluate F elsewhere.
   void restore_ida() { (void)corrector_.residual(present_.correction, f_); }
   /// Moves the rows and the equations; null: the caller's rows move alone.
-  Mover* mover() const { return mover_.get(); }
+  RowsAt* rows() const { return rows_.get(); }
   /// The unknowns that it moves.
   const Constraints& constraints() const { return joined_; }
   /// 1 where a variable moves with the rest, 0 where it follows; null: all move.
@@ -49,7 +49,7 @@ class JoinedRows {
   Constraints joined_;           // the caller's rows and equations of F
   OwnedVector moved_id_;         // id, with 1 where an algebraic variable moves with the rest
   OwnedVector none_, f_, kept_;  // of residual_at(): ycor = 0, F, the prediction
-  std::unique_ptr<Mover> mover_;
+  std::unique_ptr<RowsAt> rows_;
 };
 
 }  // namespace tether::ida_projection

@@ -7,7 +7,6 @@
 
 #include "host/rounding.hpp"
 #include "host/shortest.hpp"
-#include "movers/mover.hpp"
 
 namespace tether::ida_projection {
 

@@ -74,7 +74,11 @@ bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candi
   detect_jump(attempt);
   const bool first = last_.h == 0.0;
   move_ = move;
-  noise_ = kOfNoise * noise_in_test(attempt.order);
+  if (order_ != attempt.order) {
+    order_ = attempt.order;
+    noise_ = kOfNoise * noise_in_test(order_);
+    doubled_ = std::ldexp(1.0, -(order_ + 2));
+  }
   double sum = 0.0;
   for (Variable& v : variables_) {
     if (attempt.accepted) v.response *= kMemory;
@@ -87,8 +91,7 @@ bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candi
       std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights))) / (attempt.order + 1);
   last_ = {std::abs(attempt.h), error};
   if (first) first_error_ = error;
-  // IDA doubles h where twice the error is at most 2^-(k+1).
-  return error > std::ldexp(1.0, -(attempt.order + 2));
+  return error > doubled_;
 }
 
 bool AlgebraicTest::stay() const { return last_.error > kStays * first_error_; }

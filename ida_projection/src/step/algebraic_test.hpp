@@ -42,7 +42,10 @@ class AlgebraicTest {
   };
   std::vector<Variable> variables_;
   Tested last_, refused_;
-  double move_ = 0.0, noise_ = 0.0;
+  int order_ = 0;
+  double move_ = 0.0;
+  double noise_ = 0.0;    // at this order: multiple of independent errors
+  double doubled_ = 0.0;  // the largest error with which IDA doubles h: twice it is 2^-(k+1)
   double first_error_ = 0.0;
   int accepted_ = 0;   // in a row
   bool jump_ = false;  // the error stays in steps that are far shorter

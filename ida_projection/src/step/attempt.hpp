@@ -8,11 +8,7 @@
 namespace tether::ida_projection {
 
 /// An attempt at a step.
-struct Attempt : StepData {
-  long steps = 0;  ///< accepted before it
-  long error_test_failures = 0;
-  double h = 0.0;
-  int order = 1;
+struct Attempt : IntegratorData {
   bool repeated = false;  ///< the corrector has found a candidate for this step before
   bool accepted = false;  ///< IDA has accepted the candidate that was handed over last
 };
@@ -24,9 +20,10 @@ class History {
   /// A new run starts.
   void reset() { seen_ = handed_ = -1; }
   Attempt begin(const Ida& ida) const {
-    const long steps = ida.steps();
-    return {ida.step(),     steps,          ida.error_test_failures(), ida.step_size(), ida.order(),
-            steps == seen_, steps > handed_};
+    Attempt attempt{ida.integrator()};
+    attempt.repeated = attempt.steps == seen_;
+    attempt.accepted = attempt.steps > handed_;
+    return attempt;
   }
   /// The corrector has found a candidate.
   void found(const Attempt& attempt) { seen_ = attempt.steps; }

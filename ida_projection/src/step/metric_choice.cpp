@@ -6,17 +6,17 @@ namespace tether::ida_projection {
 // A move that disturbs stiff components makes them oscillate; the metric, built from those
 // oscillations, then makes worse moves. The other metric has one scale for each level of unknowns,
 // or one for each unknown.
-Move MetricChoice::improved(const Candidate& candidate, Move move, Mover& mover, Polish& polish,
+Move MetricChoice::improved(const Candidate& candidate, Move move, RowsAt& rows, Polish& polish,
                             bool high_index) {
   if (!due()) return move;
   MoveAndResponse at{move.length, polish.response_length(candidate)};
   if (at.response < 0.0) return move;
   const auto again = [&] {  // from the corrector's point
     polish.restore(candidate);
-    return mover.move(candidate);
+    return rows.move(candidate);
   };
   if (doubts(at)) {
-    if (!mover.rows().use_levels(!by_levels_)) {
+    if (!rows.use_levels(!by_levels_)) {
       found_none();
     } else {
       const Move other = again();
@@ -27,7 +27,7 @@ Move MetricChoice::improved(const Candidate& candidate, Move move, Mover& mover,
         move = other;
         at = its;
       } else {
-        mover.rows().use_levels(by_levels_);
+        rows.use_levels(by_levels_);
         move = again();
       }
     }

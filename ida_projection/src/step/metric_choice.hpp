@@ -1,7 +1,7 @@
 // Tether: which metric moves are made in. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 #include "step/polish.hpp"
 
 namespace tether::ida_projection {
@@ -55,7 +55,7 @@ class MetricChoice {
   bool by_levels() const { return by_levels_; }  ///< the present metric
   /// After a successful move: that one, or the one that takes its place. `high_index`: F is of
   /// index 2 or more.
-  Move improved(const Candidate& candidate, Move move, Mover& mover, Polish& polish,
+  Move improved(const Candidate& candidate, Move move, RowsAt& rows, Polish& polish,
                 bool high_index);
 
  private:

@@ -8,8 +8,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kLimit = 2;   // the highest order that damps
-constexpr long kEvery = 4;  // steps, between two samples of r
 constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6,
                  kLogSmall = -1.2;  // of r: 0.7, 0.55, 0.3
 constexpr long kFirstSteps = 60;    // a start excites what is stiff
@@ -34,35 +32,22 @@ void OrderLimit::end() {
   now_.phase = Phase::off;
 }
 
-Control OrderLimit::control(const Attempt& attempt, const Candidate& candidate, N_Vector tested,
-                            N_Vector differential) {
-  if (now_.phase == Phase::off) return {};
-  compare_slopes(attempt, candidate, differential);
-  now_.highest = std::max(now_.highest, attempt.order);
-  if (lowering())
-    return lower(attempt, error_norm(candidate.correction, candidate.weights, tested));
-  if (now_.phase == Phase::watching)
-    watch(attempt);
-  else
-    judge(attempt);
-  return {};
+// The mean of the latest log r: each new one replaces a mean one.
+void OrderLimit::take_sample() {
+  now_.samples = std::min(now_.samples + 1, kSamples);
+  now_.mean =
+      now_.samples == 1 ? *now_.pending : now_.mean + (*now_.pending - now_.mean) / now_.samples;
+  now_.pending.reset();
 }
 
-// Compares y' of two successive steps, now and then. The mean of the latest log r: each new one
-// replaces a mean one.
+// Compares y' of two successive steps.
 void OrderLimit::compare_slopes(const Attempt& attempt, const Candidate& candidate,
                                 N_Vector differential) {
-  if (now_.pending && attempt.accepted && !lowering()) {
-    now_.samples = std::min(now_.samples + 1, kSamples);
-    now_.mean =
-        now_.samples == 1 ? *now_.pending : now_.mean + (*now_.pending - now_.mean) / now_.samples;
-    now_.pending.reset();
-  }
   const bool keeps = attempt.steps % kEvery == 0;
-  if (!keeps && !(kept_slope_ && attempt.steps % kEvery == 1)) return;
+  if (!keeps && !kept_slope_) return;
   if (!kept_slope_)
     for (OwnedVector* each : {&kept_slope_, &slope_}) *each = OwnedVector(candidate.base);
-  N_VLinearSum(1.0, attempt.yp_predicted, attempt.cj, candidate.correction,
+  N_VLinearSum(1.0, candidate.predicted_slope, attempt.cj, candidate.correction,
                keeps ? kept_slope_ : slope_);
   if (keeps) return;
   now_.pending.reset();
@@ -81,7 +66,6 @@ bool OrderLimit::at_start(long steps) const {
 }
 
 void OrderLimit::watch(const Attempt& attempt) {
-  if (attempt.order <= kLimit) return;
   const double large = now_.start == Start::calm ? kLogLarge : kLogLargeIfStiff;
   if (at_start(attempt.steps) && (now_.samples == 0 || now_.mean > large)) {
     now_.start = Start::lowered;
@@ -99,7 +83,7 @@ void OrderLimit::watch(const Attempt& attempt) {
 
 // IDA lowers its order by one where that makes the estimated error no larger: weights that
 // underflow make all estimates 0. Only where the error test would be passed: it is not made then.
-Control OrderLimit::lower(const Attempt& attempt, double norm) {
+Control OrderLimit::lower(const Attempt& attempt, const Candidate& candidate, N_Vector tested) {
   if (attempt.order <= kLimit) {
     if (now_.phase == Phase::lowering_at_start) return now_.phase = Phase::watching, Control();
     now_.phase = Phase::limited;
@@ -113,6 +97,7 @@ Control OrderLimit::lower(const Attempt& attempt, double norm) {
     end();
     return {};
   }
+  const double norm = error_norm(candidate.correction, candidate.weights, tested);
   if (norm / (attempt.order + 1) > kPassed) return {};
   ++now_.tries;
   return {{1.0, kAnyRatio}, kUnderflow};

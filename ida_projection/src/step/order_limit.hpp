@@ -43,22 +43,37 @@ class OrderLimit {
   /// No limit for the rest of the run.
   void end();
   /// At the end of each successful solve. `tested`, `differential`: the variables of IDA's error
-  /// test, and those whose oscillations count; null: all.
-  Control control(const Attempt& attempt, const Candidate& candidate, N_Vector tested,
-                  N_Vector differential);
+  /// test, and those whose oscillations count; null: all. Empty: IDA's settings are left alone.
+  std::optional<Control> control(const Attempt& attempt, const Candidate& candidate,
+                                 N_Vector tested, N_Vector differential) {
+    if (now_.phase == Phase::off) return {};
+    if (now_.pending && attempt.accepted && !lowering()) take_sample();
+    if (attempt.steps % kEvery <= 1) compare_slopes(attempt, candidate, differential);
+    now_.highest = std::max(now_.highest, attempt.order);
+    if (lowering()) return lower(attempt, candidate, tested);
+    if (now_.phase == Phase::limited)
+      judge(attempt);
+    else if (attempt.order > kLimit)
+      watch(attempt);
+    return {};
+  }
   long begun() const { return now_.limits + (now_.start == Start::lowered ? 1 : 0); }
 
  private:
   enum class Phase { off, watching, lowering_at_start, lowering, limited };
   enum class Start { calm, stiff, lowered };  // lowered: stiff, and the order was lowered early
 
+  static constexpr int kLimit = 2;   // the highest order that damps
+  static constexpr long kEvery = 4;  // steps, between two samples of r
+
+  void take_sample();
   void compare_slopes(const Attempt& attempt, const Candidate& candidate, N_Vector differential);
   void watch(const Attempt& attempt);
   bool at_start(long steps) const;
   bool lowering() const {
     return now_.phase == Phase::lowering || now_.phase == Phase::lowering_at_start;
   }
-  Control lower(const Attempt& attempt, double norm);
+  Control lower(const Attempt& attempt, const Candidate& candidate, N_Vector tested);
   void judge(const Attempt& attempt);
 
   // From a new run on.

@@ -27,31 +27,12 @@ namespace {
 
 // IDA's own test promises that one more iteration changes y by at most its tolerance.
 constexpr double kMisledFactor = 2.0;
-constexpr double kNeedsResponse = 0.1;  // tolerances: a shorter move needs no response of y_a
-constexpr double kNeedsResponseOfMultipliers = 0.01;  // the same for multipliers of index 2
 
 }  // namespace
 
 void Polish::allocate(N_Vector like) {
   for (OwnedVector* each : {&delta_, &corrected_, &work_, &noise_, &residual_})
     *each = OwnedVector(like);
-}
-
-bool Polish::wanted(double length, bool smoothing) const {
-  if (!corrector_.solves() || iterative_) return false;
-  if (options_.advanced.polish == Polished::none) return false;
-  // After two iterations the corrector needs no third one, unless the algebraic variables must
-  // respond to the move. With smoothed step sizes the polish is always made, because the number of
-  // iterations scatters from step to step. Multipliers of index 2 are an exception: they need two
-  // iterations in nearly every step, and respond to shorter moves.
-  const bool high_index = variables_.any() && variables_.high_index();
-  if (smoothing && !high_index) return true;
-  return corrector_.iterations() <= 1 || length > longest_without_response(smoothing);
-}
-
-double Polish::longest_without_response(bool smoothing) const {
-  if (!variables_.any()) return std::numeric_limits<double>::infinity();
-  return smoothing ? kNeedsResponseOfMultipliers : kNeedsResponse;
 }
 
 void Polish::keep(const Candidate& candidate) {
@@ -76,8 +57,14 @@ bool Polish::know_noise() {
 // shifted for the call and put back bit for bit.
 bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
   N_VScale(1.0, candidate.base, work_);
-  N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
-  N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
+  if (double* const base = candidate.base_entries; base != nullptr) {
+    const double* const corrected = N_VGetArrayPointer(corrected_);
+    for (sunindextype j = 0, n = N_VGetLength(corrected_); j < n; ++j)
+      base[j] += candidate.correction_entries[j] - corrected[j];
+  } else {
+    N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
+    N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
+  }
   const bool found = newton_step(delta_);
   N_VScale(1.0, work_, candidate.base);
   return found;
@@ -93,14 +80,12 @@ double Polish::response_length(const Candidate& candidate) {
   return std::isfinite(length) ? length : -1.0;
 }
 
-// IDAS takes differences for sensitivities from the residual that IDA keeps, so that it is
-// restored.
-const double* Polish::response(const StepData& step) {
-  N_VScale(1.0, step.residual, residual_);
+const double* Polish::response(const Candidate& candidate, N_Vector residual) {
+  N_VScale(1.0, residual, residual_);
   const bool known = know_noise();
-  N_VScale(1.0, residual_, step.residual);
+  N_VScale(1.0, residual_, residual);
   if (!known) return nullptr;
-  N_VLinearSum(1.0, delta_, -algebraic_factor(step.cj), noise_, work_);
+  N_VLinearSum(1.0, delta_, -algebraic_factor(candidate.cj), noise_, work_);
   return N_VGetArrayPointer(work_);
 }
 
@@ -148,6 +133,15 @@ bool Polish::forecast_polish(const Candidate& candidate, double cj, double toler
 
 // delta_d <- differential * delta_d, delta_a <- algebraic * delta_a, ycor <- ycor + delta.
 void Polish::apply(const Candidate& candidate, double differential, double algebraic) {
+  if (variables_.any() && candidate.correction_entries != nullptr) {
+    const double* const mask = variables_.mask();
+    double* const delta = N_VGetArrayPointer(delta_);
+    for (sunindextype j = 0, n = N_VGetLength(delta_); j < n; ++j) {
+      delta[j] *= mask[j] != 0.0 ? differential : algebraic;
+      candidate.correction_entries[j] += delta[j];
+    }
+    return;
+  }
   if (variables_.any()) {
     N_VProd(variables_.id(), delta_, work_);
     N_VLinearSum(1.0, delta_, -1.0, work_, delta_);

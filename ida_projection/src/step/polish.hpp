@@ -3,13 +3,14 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "fast/kernels.hpp"
 #include "host/candidate.hpp"
 #include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 #include "start/algebraic.hpp"
 
 namespace tether::ida_projection {
@@ -113,9 +114,22 @@ class Polish {
 
   /// Whether a polish is worth its price after a move of this length. `smoothing`: step sizes are
   /// smoothed.
-  bool wanted(double length, bool smoothing) const;
+  bool wanted(double length, bool smoothing) const {
+    if (!corrector_.solves() || iterative_) return false;
+    if (options_.advanced.polish == Polished::none) return false;
+    // After two iterations the corrector needs no third one, unless the algebraic variables must
+    // respond to the move. With smoothed step sizes the polish is always made, because the number
+    // of iterations scatters from step to step. Multipliers of index 2 are an exception: they need
+    // two iterations in nearly every step, and respond to shorter moves.
+    if (corrector_.iterations() <= 1) return true;
+    const bool high_index = variables_.any() && variables_.high_index();
+    return (smoothing && !high_index) || length > longest_without_response(smoothing);
+  }
   /// Longer moves need a response of the algebraic variables; infinity if there are none.
-  double longest_without_response(bool smoothing) const;
+  double longest_without_response(bool smoothing) const {
+    if (!variables_.any()) return std::numeric_limits<double>::infinity();
+    return smoothing ? kNeedsResponseOfMultipliers : kNeedsResponse;
+  }
   /// Whether response(), of contiguous vectors, can be computed.
   bool is_response_available() const { return corrector_.solves() && !iterative_; }
   /// After a move: length of the response -J^-1 F_y dy over the differential variables, in
@@ -139,12 +153,16 @@ class Polish {
 
   /// After add_newton_step(): the part of delta() that is the response of algebraic variables to
   /// the move, N entries. Null: F or the linear solver fails. Costs one evaluation of F.
-  const double* response(const StepData& step);
+  /// `residual`: IDA's own, from which IDAS takes differences for sensitivities; it is restored.
+  const double* response(const Candidate& candidate, N_Vector residual);
   N_Vector delta() const { return delta_; }          ///< of add_newton_step()
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
   long iterations() const { return iterations_; }    ///< in this solve()
 
  private:
+  static constexpr double kNeedsResponse = 0.1;  // tolerances: a shorter move needs none of y_a
+  static constexpr double kNeedsResponseOfMultipliers = 0.01;  // of index 2
+
   enum class Known { nothing, noise, noise_and_step };
 
   bool know_noise();

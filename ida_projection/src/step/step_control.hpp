@@ -1,7 +1,10 @@
 // Tether: control of IDA's step sizes and orders. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "movers/mover.hpp"
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 #include "step/algebraic_test.hpp"
 #include "step/ida_settings.hpp"
 #include "step/order_limit.hpp"
@@ -27,15 +30,39 @@ class StepControl {
 
   /// Before the corrector; in another attempt at the step that was handed over last the weights are
   /// those that it has changed.
-  void restore_weights(N_Vector weights, bool same_step);
+  void restore_weights(N_Vector weights, bool same_step) {
+    const double factor = std::exchange(weights_factor_, 1.0);
+    if (same_step) restore(weights, factor);
+  }
   /// For an attempt that will be handed over, after a move of this length (infinity: it was not
   /// moved). The last polish followed the move. `tested`: the variables of IDA's error test,
   /// `differential`: those whose oscillations count (null: all); `unmoved`: the correction before a
   /// sudden move (null: an ordinary one).
   void choose_step(const Attempt& attempt, const Candidate& candidate, Polish& polish, double move,
-                   N_Vector tested, N_Vector differential, N_Vector unmoved);
-  /// Counts the rejected attempts before this one.
-  void begin_attempt(const Attempt& attempt, bool engaged);
+                   N_Vector tested, N_Vector differential, N_Vector unmoved) {
+    // |ycor| decides the next step size, its ratio to the second difference the order.
+    const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
+    const bool engaged = std::isfinite(move);
+    if (engaged && algebraic_test_.acts()) test_algebraic(attempt, candidate, polish, move);
+    if (smoother_.on()) {
+      apply(smoother_.control(attempt, norm(candidate.correction)));
+    } else if (engaged) {
+      const auto control = order_limit_.control(attempt, candidate, tested, differential);
+      if (control) apply(*control);
+    }
+    if (unmoved != nullptr) test_unmoved(attempt, norm(unmoved), norm(candidate.correction));
+    if (weights_factor_ != 1.0) N_VScale(weights_factor_, candidate.weights, candidate.weights);
+  }
+  /// Counts the rejected attempts before this one. IDA may double its step right after a doubling
+  /// was rejected, and raises the order only after k + 2 steps of one size. At order 1 a failed
+  /// error test in each step, or after each three of one size, can therefore go on for ever.
+  void begin_attempt(const Attempt& attempt, bool engaged) {
+    if (attempt.repeated || smoother_.on()) return;
+    const bool failed = last_error_failures_ < attempt.error_test_failures;
+    last_error_failures_ = attempt.error_test_failures;
+    refused_ = failed ? refused_ + kOftenRefused - 1 : std::max(0, refused_ - 1);
+    if (engaged && refused_ >= kTrapped) begin_smoothing({});
+  }
   /// The corrector failed in a way that a smaller step may cure.
   void corrector_failed();
 
@@ -60,6 +87,16 @@ class StepControl {
   bool in_trouble(const Attempt& attempt) const;
 
  private:
+  static constexpr int kOftenRefused = 4;  // steps for each failed error test, of the run so far
+  // Ten steps in a row with failed error tests, see refused_.
+  static constexpr int kTrapped = 10 * (kOftenRefused - 1);
+
+  void restore(N_Vector weights, double factor) const;
+  void test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
+                      double move);
+  void apply(const Control& control);
+  void test_unmoved(const Attempt& attempt, double before, double after);
+
   const Ida& ida_;
   const Options& options_;
   Statistics& statistics_;

@@ -76,10 +76,13 @@ double StepSmoother::test_constant(double h, int order) const {
 
 // A setpoint s makes steps shorter by s^(1/(k+1)). It depends on the order so that steps of all
 // orders become shorter by the same factor.
-double StepSmoother::setpoint(int order) const {
+double StepSmoother::setpoint(int order) {
+  if (now_->setpoint_order == order) return now_->setpoint;
   const double graded =
       now_->factors.most * std::pow(kOfOrder, order - options_.advanced.maximum_order);
-  return kSetpoint * std::max(graded, std::min(now_->factors.least, now_->factors.most));
+  now_->setpoint_order = order;
+  return now_->setpoint =
+             kSetpoint * std::max(graded, std::min(now_->factors.least, now_->factors.most));
 }
 
 double StepSmoother::filter(double log_c, int order) const {

@@ -57,6 +57,8 @@ class StepSmoother {
   // From the beginning on.
   struct State {
     SetpointFactors factors;
+    int setpoint_order = 0;
+    double setpoint = 0.0;        // at this order
     double h = 0.0, log_c = 0.0;  // of the attempt that IDA judges; 0: there was none
     int order = 0;
     std::array<double, kMaximumOrder> past{};  // accepted sizes, the latest first
@@ -77,7 +79,7 @@ class StepSmoother {
   };
 
   void note_previous(bool accepted, double h, int order);
-  double setpoint(int order) const;
+  double setpoint(int order);
   double error_constant(double h, int order) const;
   double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;

@@ -33,7 +33,7 @@ void FirstSteps::reset() {
 }
 
 std::string FirstSteps::check(const Candidate& candidate, const Attempt& attempt,
-                              N_Vector corrected, const AlgebraicVariables& variables, Mover& mover,
+                              N_Vector corrected, const AlgebraicVariables& variables, RowsAt& rows,
                               Corrector& corrector) {
   Corrected at{candidate, attempt, corrected, attempt.h, nullptr, corrector};
   std::string found = compare_with_tolerances(at);
@@ -46,7 +46,7 @@ std::string FirstSteps::check(const Candidate& candidate, const Attempt& attempt
     return found;
   at.id = variables.mask();
   at.span *= static_cast<double>(std::max(1L, steps - std::exchange(run_.last_check, steps)));
-  return find_false_rows(at, mover);
+  return find_false_rows(at, rows);
 }
 
 // If |y| is below a tolerance in the norm of the error test, y = 0 would pass the test as well. A
@@ -57,7 +57,7 @@ std::string FirstSteps::compare_with_tolerances(const Corrected& at) {
   if (!work_) work_ = OwnedVector(weights);
   N_VLinearSum(1.0, at.candidate.base, 1.0, at.ycor, work_);
   const double size = N_VWrmsNorm(work_, weights);
-  N_VLinearSum(1.0, at.attempt.yp_predicted, at.attempt.cj, at.ycor, work_);
+  N_VLinearSum(1.0, at.candidate.predicted_slope, at.attempt.cj, at.ycor, work_);
   const double change = std::abs(at.span) * N_VWrmsNorm(work_, weights);
   const bool grows = size > kGrows * run_.largest;
   run_.largest = std::max(run_.largest, size);
@@ -69,7 +69,7 @@ std::string FirstSteps::compare_with_tolerances(const Corrected& at) {
 
 // Tests C y' + g_t = 0 at the corrector's point, where y' satisfies F. C y' costs a product with
 // the present C; g is evaluated only for a row that stands out.
-std::string FirstSteps::find_false_rows(const Corrected& at, Mover& mover) {
+std::string FirstSteps::find_false_rows(const Corrected& at, RowsAt& rows) {
   const auto n = static_cast<std::size_t>(N_VGetLength(at.candidate.base));
   if (point_.size() != n) {  // all that a comparison needs, so that none allocates
     for (std::vector<double>* each : {&point_, &slope_, &better_, &better_p_}) each->resize(n);
@@ -77,13 +77,13 @@ std::string FirstSteps::find_false_rows(const Corrected& at, Mover& mover) {
     faults_.reserve(n);
     for (OwnedVector* each : {&work_, &base_, &ycor_}) *each = OwnedVector(at.candidate.base);
   }
-  const double* predicted = N_VGetArrayPointer(at.attempt.yp_predicted);
+  const double* predicted = N_VGetArrayPointer(at.candidate.predicted_slope);
   const double* ycor = N_VGetArrayPointer(at.ycor);
   for (std::size_t j = 0; j < n; ++j) {
     point_[j] = at.candidate.base_entries[j] + ycor[j];
     slope_[j] = predicted[j] + at.attempt.cj * ycor[j];
   }
-  if (!mover.tangency(slope_, at.id, tangency_)) return {};
+  if (rows.age > 0 || !rows.tangency(slope_, at.id, tangency_)) return {};
   std::string text = find_one_sided_row(at.attempt.t);
   if (!text.empty()) return text;
   const double root = std::sqrt(static_cast<double>(n));

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "host/owned_vector.hpp"
-#include "movers/mover.hpp"
+#include "movers/rows_at.hpp"
 #include "start/algebraic.hpp"
 #include "step/attempt.hpp"
 #include "watch/row_faults.hpp"
@@ -18,7 +18,7 @@ class FirstSteps {
  public:
   /// Number of accepted steps in which rows and tolerances are checked.
   static constexpr long kSteps = 100;
-  static constexpr long kEvery = 16;  ///< steps, after these; observations that cost take as many
+  static constexpr long kEvery = 64;  ///< steps, after these
 
   FirstSteps(const Constraints& constraints, RowFaults& faults)
       : constraints_(constraints), faults_(faults) {}
@@ -35,7 +35,7 @@ class FirstSteps {
   /// After a successful move; `corrected`: the corrector's ycor. Returns the fault found; empty:
   /// none.
   std::string check(const Candidate& candidate, const Attempt& attempt, N_Vector corrected,
-                    const AlgebraicVariables& variables, Mover& mover, Corrector& corrector);
+                    const AlgebraicVariables& variables, RowsAt& rows, Corrector& corrector);
 
  private:
   static constexpr long kSettled = 2;  // accepted steps: before, y' is still that of the start
@@ -67,7 +67,7 @@ class FirstSteps {
   };
 
   std::string compare_with_tolerances(const Corrected& at);
-  std::string find_false_rows(const Corrected& at, Mover& mover);
+  std::string find_false_rows(const Corrected& at, RowsAt& rows);
   std::string find_one_sided_row(double t);
   bool refine_slope(const Corrected& at);
   std::string diagnose(int row, double noticed, const Corrected& at);

@@ -15,9 +15,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr double kPartInTest = 0.5;      // tolerances: shorter moves fail no error test
 constexpr int kNameAfter = 4;            // failures in a row, of which IDA gives up after ten
 constexpr double kChange = 1e-3;         // of max(1, |y_j|), for differences
 constexpr std::size_t kMostNamed = 200;  // algebraic variables, each an evaluation of F
@@ -158,32 +155,22 @@ void Observer::corrector_failed(const Candidate& candidate, int flag) {
     run_.undetermined = report_.message = "before t = " + std::to_string(candidate.t) + " " + found;
 }
 
-void Observer::count_rejections(const Attempt& attempt) {
-  const bool moved = run_.moved > kPartInTest;
-  if (attempt.repeated) {
-    ++run_.rejections;
-    if (moved && std::exchange(run_.last_refused, attempt.steps) != attempt.steps)
-      ++run_.refused_steps;
-    return;
-  }
-  run_.moved_in_row = moved ? run_.moved_in_row + 1 : 0;
-  run_.standing = attempt.t + attempt.h != attempt.t ? 0 : run_.standing + 1;
-  if (attempt.steps < run_.window_begin + kWindow) return;
+void Observer::end_window(long steps) {
   if (3 * run_.refused_steps > kWindow) run_.refused = true;
-  run_.window_begin = attempt.steps;
+  run_.window_begin = steps;
   run_.refused_steps = 0;
   if (!run_.refused) run_.rejections_before = run_.rejections;
 }
 
-bool Observer::begin_attempt(const Attempt& attempt, const Candidate& candidate) {
-  count_rejections(attempt);
-  const bool projected =
-      std::isfinite(std::exchange(run_.moved, std::numeric_limits<double>::infinity()));
-  if (attempt.accepted && projected && options_.progress) {
-    run_.progress.steps = attempt.steps;
-    std::string ignored;
-    guarded([&] { return options_.progress(run_.progress), 0; }, ignored);
-  }
+void Observer::tell_progress(const Attempt& attempt) {
+  if (!attempt.accepted || !std::isfinite(run_.moved)) return;
+  run_.progress.steps = attempt.steps;
+  std::string ignored;
+  guarded([&] { return options_.progress(run_.progress), 0; }, ignored);
+}
+
+// False: the run is hopeless.
+bool Observer::goes_on(const Attempt& attempt, const Candidate& candidate) {
   if (run_.standing >= kWindow) {  // steps shorter than the rounding of t
     report_.warn(Status::collapsed, "t stands at " + brief(attempt.t) +
                                         ": steps are shorter than its rounding" +
@@ -191,7 +178,7 @@ bool Observer::begin_attempt(const Attempt& attempt, const Candidate& candidate)
     return false;
   }
   const bool false_row = first_steps_.false_row_found();
-  const bool collapsed = run_.refused || (false_row && run_.moved_in_row >= 5 * kWindow);
+  const bool collapsed = run_.refused || (false_row && run_.moved_in_row >= kMostMovedByFalseRow);
   if (!collapsed || report_.warning() == Status::collapsed) return true;
   const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
   const std::string text = cause(attempt, candidate, doubt);
@@ -257,34 +244,19 @@ void Observer::skipped(const Move& measured) {
     *largest = std::max(*largest, measured.drift_before);
 }
 
-void Observer::begin_move() {
-  if (tally_.attempts++ % FirstSteps::kEvery == 0) move_begun_ = Clock::now();
+void Observer::measure(const Candidate& candidate, const Move& move, RowsAt& rows) {
+  const double left = rows.remaining_drift(candidate);
+  if (move.status == Status::success)
+    statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, left);
+  statistics_.seconds += std::chrono::duration<double>(Clock::now() - move_begun_).count() *
+                         static_cast<double>(tally_.attempts == 1 ? 1 : kTimed);
 }
 
-void Observer::after_move(const Attempt& attempt, const Candidate& candidate, const Move& move,
-                          N_Vector corrected, Mover& mover) {
-  Statistics& s = statistics_;
-  const bool good = move.status == Status::success;
-  if ((tally_.attempts - 1) % FirstSteps::kEvery == 0) {
-    const double left = mover.remaining_drift(candidate);
-    if (good) s.largest_drift_after = std::max(s.largest_drift_after, left);
-    s.seconds += std::chrono::duration<double>(Clock::now() - move_begun_).count() *
-                 static_cast<double>(tally_.attempts == 1 ? 1 : FirstSteps::kEvery);
-  }
-  ++(move.not_needed ? s.skipped : s.projections);
-  if (move.capped) ++s.moves_capped;
-  if (!good) return;
-  s.largest_drift_before = std::max(s.largest_drift_before, move.drift_before);
-  s.largest_move = std::max(s.largest_move, move.length);
-  tally_.move_sum += move.length;
-  run_.moved = move.length;
-  run_.progress = {attempt.t, attempt.h, attempt.order, move.drift_before, move.length, 0};
-  if (attempt.steps == 0) check_start(attempt, move);
-  if (attempt.repeated || report_.warning() != Status::success ||
-      !FirstSteps::are_checked(attempt.steps) || !in_use(Mechanism::false_row_watch))
-    return;
+void Observer::check_rows(const Attempt& attempt, const Candidate& candidate, N_Vector corrected,
+                          RowsAt& rows) {
+  if (report_.warning() != Status::success || !in_use(Mechanism::false_row_watch)) return;
   const std::string doubt =
-      first_steps_.check(candidate, attempt, corrected, variables_, mover, corrector_);
+      first_steps_.check(candidate, attempt, corrected, variables_, rows, corrector_);
   if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
   if (report_.advice.empty()) report_.advice = first_steps_.idle_row();
 }

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "host/ida_lifetime.hpp"
 #include "step/attempt.hpp"
@@ -41,15 +43,39 @@ class Observer {
   /// high an index. The index is known.
   void check_form(const Candidate& candidate);
   /// Before the move of an attempt. False: the run is hopeless, the report's warning says why.
-  bool begin_attempt(const Attempt& attempt, const Candidate& candidate);
+  bool begin_attempt(const Attempt& attempt, const Candidate& candidate) {
+    count_rejections(attempt);
+    if (options_.progress) tell_progress(attempt);
+    run_.moved = std::numeric_limits<double>::infinity();
+    const bool doubtful =
+        run_.standing >= kWindow || run_.refused || run_.moved_in_row >= kMostMovedByFalseRow;
+    return !doubtful || goes_on(attempt, candidate);
+  }
   /// An attempt that needed no move.
   void skipped(const Move& measured);
   /// Before and after a move. Reading the clock costs as much as a small projection: the first one
   /// is timed, which finds out what the others keep, and every 16th for the others. These see what
   /// g is left, too.
-  void begin_move();
+  void begin_move() {
+    if (tally_.attempts++ % kTimed == 0) move_begun_ = Clock::now();
+  }
   void after_move(const Attempt& attempt, const Candidate& candidate, const Move& move,
-                  N_Vector corrected, Mover& mover);
+                  N_Vector corrected, RowsAt& rows) {
+    if ((tally_.attempts - 1) % kTimed == 0) measure(candidate, move, rows);
+    ++(move.not_needed ? statistics_.skipped : statistics_.projections);
+    if (move.capped) ++statistics_.moves_capped;
+    if (move.status != Status::success) return;
+    statistics_.largest_drift_before =
+        std::max(statistics_.largest_drift_before, move.drift_before);
+    statistics_.largest_move = std::max(statistics_.largest_move, move.length);
+    tally_.move_sum += move.length;
+    run_.moved = move.length;
+    if (options_.progress)
+      run_.progress = {attempt.t, attempt.h, attempt.order, move.drift_before, move.length, 0};
+    if (attempt.steps == 0) check_start(attempt, move);
+    if (!attempt.repeated && FirstSteps::are_checked(attempt.steps))
+      check_rows(attempt, candidate, corrected, rows);
+  }
 
   /// The message of a failed attempt, with causes where they are to be printed.
   std::string explained(Status outcome, const std::string& text) const;
@@ -63,7 +89,11 @@ class Observer {
   const std::string& bypass_text() const { return bypass_.text; }
 
  private:
+  using Clock = std::chrono::steady_clock;
   static constexpr long kWindow = 200;  // accepted steps, in which most attempts fail
+  static constexpr long kMostMovedByFalseRow = 5 * kWindow;  // steps, before such a run ends
+  static constexpr long kTimed = 16;  // attempts: observations that cost are made in one of so many
+  static constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
 
   struct Run {
     OwnedVector start;         // its first y, of contiguous vectors
@@ -90,7 +120,24 @@ class Observer {
   };
 
   void keep_point_before(const Candidate& candidate, OwnedVector& y) const;
-  void count_rejections(const Attempt& attempt);
+  void count_rejections(const Attempt& attempt) {
+    const bool moved = run_.moved > kPartInTest;
+    if (attempt.repeated) {
+      ++run_.rejections;
+      if (moved && std::exchange(run_.last_refused, attempt.steps) != attempt.steps)
+        ++run_.refused_steps;
+      return;
+    }
+    run_.moved_in_row = moved ? run_.moved_in_row + 1 : 0;
+    run_.standing = attempt.t + attempt.h != attempt.t ? 0 : run_.standing + 1;
+    if (attempt.steps >= run_.window_begin + kWindow) end_window(attempt.steps);
+  }
+  void end_window(long steps);
+  void tell_progress(const Attempt& attempt);
+  bool goes_on(const Attempt& attempt, const Candidate& candidate);
+  void measure(const Candidate& candidate, const Move& move, RowsAt& rows);
+  void check_rows(const Attempt& attempt, const Candidate& candidate, N_Vector corrected,
+                  RowsAt& rows);
   std::string cause(const Attempt& attempt, const Candidate& candidate, const std::string& doubt);
   std::string undetermined_multipliers(const Candidate& candidate, N_Vector y);
   std::string too_high_index() const;
@@ -109,7 +156,7 @@ class Observer {
   Run run_;
   Tally tally_;
   Bypass bypass_;
-  std::chrono::steady_clock::time_point move_begun_;
+  Clock::time_point move_begun_;
 };
 
 }  // namespace tether::ida_projection

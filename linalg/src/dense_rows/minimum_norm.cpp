@@ -53,7 +53,6 @@ struct MinimumNorm::Large {
   Rows L;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
   Eigen::VectorXd work, rhs;
-  std::vector<int> order;  // pivot order
 };
 
 MinimumNorm::MinimumNorm() : large_(std::make_unique<Large>()) {}
@@ -79,14 +78,15 @@ void MinimumNorm::resize(int rows, int columns) {
   if (rows > 0 && rows <= small::KeptRows::kRows && columns <= small::KeptRows::kColumns) {
     few_ = std::make_unique<small::KeptRows>();
     few_->resize(rows);
+    solve_few_ = few_->solve;
   }
   large_->A.resize(rows, columns);
   large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
   large_->work.resize(std::max(rows, columns));
   large_->rhs.resize(std::max(rows, columns));
   large_->L.resize(rows, rows);
-  large_->order.resize(m);
-  std::iota(large_->order.begin(), large_->order.end(), 0);
+  order_.resize(m);
+  std::iota(order_.begin(), order_.end(), 0);
 }
 
 double* MinimumNorm::row(int i) { return large_->A.row(i).data(); }
@@ -130,30 +130,43 @@ bool MinimumNorm::scale(int k, int i) {
 }
 
 bool MinimumNorm::factor_kept(const double* wide, int width, const int* rows, const int* columns) {
-  const int r = rank_;
-  if (r == 0 || (few_ != nullptr && r < m_)) return false;
-  if (factors_ == Factors::orthogonal) decided_least_ = independent_part(r - 1);
-  if (decided_least_ < kLeastSine) return false;
-  const double sine = std::max(kLeastSine, kLeastShare * decided_least_);
-  rank_ = factored_rank_ = 0;  // if it fails nothing is known of the rows any more
-  least_square_ = 1.0;
-  if (few_ != nullptr) {
-    const small::Gathered from{wide, width, rows, columns, metric_.data()};
-    if (!few_->factor(*few_, from, large_->order.data(), m_, n_, sine * sine)) return false;
-    for (int k = 0; k < m_; ++k)
-      least_square_ = few_->ratio[k] < least_square_ ? few_->ratio[k] : least_square_;
-    factors_ = Factors::few;
-  } else {
-    for (int k = 0; k < m_; ++k) {
-      const int i = pivot(k);
-      gather(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, k);
-      if (!scale(k, i)) return false;
-    }
-    const double least = large_->factor(r);
-    if (!(least >= sine)) return false;
-    least_square_ = least * least;
-    factors_ = Factors::gram;
+  if (rank_ == 0) return false;
+  if (factors_ == Factors::orthogonal) {
+    const double least = independent_part(rank_ - 1);
+    least_sine_ = least < kLeastSine ? 0.0 : std::max(kLeastSine, kLeastShare * least);
   }
+  if (least_sine_ == 0.0) return false;
+  return few_ != nullptr ? factor_few(wide, width, rows, columns)
+                         : factor_gram(wide, width, rows, columns);
+}
+
+// If it fails nothing is known of the rows any more.
+bool MinimumNorm::factor_few(const double* wide, int width, const int* rows, const int* columns) {
+  if (rank_ < m_) return false;
+  const small::Gathered from{wide, width, rows, columns, metric_.data()};
+  if (!few_->factor(*few_, from, order_.data(), m_, n_, least_sine_ * least_sine_)) {
+    rank_ = factored_rank_ = 0;
+    return false;
+  }
+  double least = 1.0;
+  for (int k = 0; k < m_; ++k) least = few_->ratio[k] < least ? few_->ratio[k] : least;
+  least_square_ = least;
+  factors_ = Factors::few;
+  return true;
+}
+
+bool MinimumNorm::factor_gram(const double* wide, int width, const int* rows, const int* columns) {
+  const int r = rank_;
+  rank_ = factored_rank_ = 0;
+  for (int k = 0; k < m_; ++k) {
+    const int i = pivot(k);
+    gather(wide + static_cast<std::ptrdiff_t>(rows[i]) * width, columns, k);
+    if (!scale(k, i)) return false;
+  }
+  const double least = large_->factor(r);
+  if (!(least >= least_sine_)) return false;
+  least_square_ = least * least;
+  factors_ = Factors::gram;
   rank_ = factored_rank_ = r;
   return true;
 }
@@ -165,7 +178,7 @@ void MinimumNorm::factor_orthogonal(double rank_tolerance) {
   qr.setThreshold(rank_tolerance);
   qr.compute(large_->A.transpose());
   const int* const pivots = qr.colsPermutation().indices().data();
-  large_->order.assign(pivots, pivots + m_);
+  order_.assign(pivots, pivots + m_);
   rank_ = factored_rank_ = qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0;
   least_square_ = rank_ > 0 ? std::pow(independent_part(rank_ - 1), 2) : 1.0;
 }
@@ -173,13 +186,6 @@ void MinimumNorm::factor_orthogonal(double rank_tolerance) {
 double MinimumNorm::scaled(const double* g, int i) const {
   const double length = row_norm_[static_cast<std::size_t>(i)];
   return length > std::numeric_limits<double>::min() ? g[i] / length : g[i];
-}
-
-void MinimumNorm::solve(const double* g, double* dy) {
-  if (factors_ == Factors::few)
-    few_->solve(*few_, large_->order.data(), n_, g, metric_.data(), dy);
-  else
-    factors_ == Factors::gram ? solve_gram(g, dy) : solve_orthogonal(g, dy);
 }
 
 // Computes du = A^T (A A^T)^-1 b over the rows that take part. The inconsistency of the others is
@@ -219,8 +225,6 @@ void MinimumNorm::solve_orthogonal(const double* g, double* dy) {
                                               work.data());
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
-
-int MinimumNorm::pivot(int k) const { return large_->order[static_cast<std::size_t>(k)]; }
 
 double MinimumNorm::row_norm(int i) const {
   return factors_ == Factors::few ? std::sqrt(few_->square[i])

@@ -68,11 +68,27 @@ TETHER_INLINE bool factor_block(KeptRows& s, double* U, const int* order, int m,
   return true;
 }
 
+// The same for one row.
+TETHER_INLINE bool factor_one(KeptRows& s, const Gathered& from, int n) {
+  const double* c = from.wide + static_cast<std::ptrdiff_t>(from.rows[0]) * from.width;
+  double square = 0.0;
+  for (int j = 0; j < n; ++j) {
+    const double a = c[from.columns[j]] * from.D[j];
+    s.A[KeptRows::stride(1) * j] = a;
+    square += a * a;
+  }
+  s.inverse[0] = 1.0 / square;
+  s.square[0] = square;
+  s.ratio[0] = 1.0;
+  return square > kSmallestSquare && square < kLargestSquare;
+}
+
 // Factors up to four rows. A A^T is summed while the columns are gathered, and no entry of it or of
 // L is loaded from memory just after it was stored.
 template <int Rows>
 TETHER_INLINE bool factor_few(KeptRows& s, const Gathered& from, const int* order, int n,
                               double least) {
+  if constexpr (Rows == 1) return factor_one(s, from, n);
   const double* c[4];
   for (int k = 0; k < 4; ++k)
     c[k] = from.wide + static_cast<std::ptrdiff_t>(from.rows[order[k < Rows ? k : 0]]) * from.width;

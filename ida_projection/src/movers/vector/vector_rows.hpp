@@ -3,7 +3,7 @@
 #pragma once
 
 #include "host/owned_vector.hpp"
-#include "movers/rows_at.hpp"
+#include "movers/newton.hpp"
 #include "movers/vector/vector_metric.hpp"
 
 namespace tether::ida_projection {
@@ -20,19 +20,25 @@ namespace tether::ida_projection {
 /// and reports where it is told to. Vectors may be spread over processes: all of these have the
 /// same outcome on every one.
 template <class Store>
-class VectorRows : public RowsAt {
+class VectorRows : public Newton<VectorRows<Store>> {
+  using Base = Newton<VectorRows<Store>>;
+  using Factors = RowsAt::Factors;
+
  public:
+  using RowsAt::drift;
+  using RowsAt::factors;
+  using RowsAt::report;
+
   VectorRows(const Constraints& constraints, const Options& options, Statistics& statistics,
              N_Vector like)
-      : RowsAt(Kind::vectors),
+      : Base(RowsAt::Kind::vectors, options, statistics),
         metric_(options, like),
         rows_(constraints, statistics, like, report),
-        statistics_(statistics),
         y_(like),
         dy_(like),
         work_(like) {
     free_all();
-    reset();
+    forget();
   }
 
   Status load(const Candidate& candidate, bool) override {
@@ -63,7 +69,7 @@ class VectorRows : public RowsAt {
     return status;
   }
   Solution solve(Solve how) override {
-    if (how != Solve::test) ++statistics_.iterations;
+    if (how != Solve::test) ++Base::statistics_.iterations;
     Solution found;
     found.left = rows_.solve(metric_.D(), dy_);
     found.length = N_VWrmsNorm(dy_, at_.weights);
@@ -74,7 +80,9 @@ class VectorRows : public RowsAt {
     N_VLinearSum(1.0, y_, -share, dy_, y_);
     return Status::success;
   }
-  bool is_rounding(double move) override { return !std::isfinite(move) && rows_.rounding_only(); }
+  bool is_rounding(double move = RowsAt::kAnyMove) override {
+    return !std::isfinite(move) && rows_.rounding_only();
+  }
 
   double follow(const Candidate& candidate, N_Vector change) override {
     if (change == nullptr) {
@@ -103,7 +111,7 @@ class VectorRows : public RowsAt {
     return Status::success;
   }
   void accept() override { metric_.accept(); }
-  void reset() override {
+  void forget() {
     metric_.reset();
     factors = Factors::none;
     moves_ = false;
@@ -119,7 +127,6 @@ class VectorRows : public RowsAt {
     metric_.free_all();
   }
 
-  Statistics& statistics_;
   Candidate at_{};
   OwnedVector y_, dy_, work_;
   bool moves_ = false;            // have begun in this run

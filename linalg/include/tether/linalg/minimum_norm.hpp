@@ -61,7 +61,12 @@ class MinimumNorm {
 
   /// dy from the kept factors; g has m entries in the units of the rows, dy has n entries.
   /// Dropped rows take no part; see inconsistency().
-  void solve(const double* g, double* dy);
+  void solve(const double* g, double* dy) {
+    if (factors_ == Factors::few)
+      solve_few_(*few_, order_.data(), n_, g, metric_.data(), dy);
+    else
+      factors_ == Factors::gram ? solve_gram(g, dy) : solve_orthogonal(g, dy);
+  }
 
   /// Until the next factor() only the first `rank` rows of the pivot order take part, at most as
   /// many as factor() has kept.
@@ -70,7 +75,7 @@ class MinimumNorm {
   int rank() const { return rank_; }          ///< rows that take part in solve()
   int dropped() const { return m_ - rank_; }  ///< rows that do not
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
-  int pivot(int k) const;
+  int pivot(int k) const { return order_[static_cast<std::size_t>(k)]; }
   /// |R_kk|, k < rank(): how much of a unit row is independent of those before it. From factor() no
   /// larger than the one before.
   double independent_part(int k) const;
@@ -89,6 +94,8 @@ class MinimumNorm {
 
  private:
   enum class Factors { orthogonal, gram, few };
+  bool factor_few(const double* wide, int width, const int* rows, const int* columns);
+  bool factor_gram(const double* wide, int width, const int* rows, const int* columns);
   void gather(const double* c, const int* columns, int k);
   bool scale(int k, int i);
   void factor_orthogonal(double rank_tolerance);
@@ -100,9 +107,12 @@ class MinimumNorm {
   struct TETHER_HIDDEN Large;  // Eigen's types stay inside the library: see eigen.hpp
   std::unique_ptr<Large> large_;
   std::unique_ptr<small::KeptRows> few_;  // of factor_kept(); null: beyond its sizes
+  void (*solve_few_)(const small::KeptRows&, const int*, int, const double*, const double*,
+                     double*) = nullptr;
+  std::vector<int> order_;  // of pivots
   Factors factors_ = Factors::orthogonal;
   double least_square_ = 1.0;
-  double decided_least_ = 1.0;  // least independent part of the rows at the last factor()
+  double least_sine_ = 0.0;  // of kept rows, by the last factor(); 0: they are too dependent
   std::vector<double> metric_, row_norm_, inconsistency_;  // metric_: D
 };
 
