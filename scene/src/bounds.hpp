@@ -21,6 +21,9 @@ constexpr std::size_t kMostInColumns = 200;
 /// Bodies beyond which pictures leave something out.
 constexpr std::size_t kManyBodies = 300;
 
+/// A time so near to the boundary of a step, in steps, is that of the boundary up to rounding.
+constexpr double kSameBoundary = 1e-9;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace tether::scene

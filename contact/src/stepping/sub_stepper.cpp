@@ -119,18 +119,19 @@ void SubStepper::add_joints(std::unique_ptr<JointPart> part) {
 }
 
 void SubStepper::observe(StepObserver observer) {
-  const auto tell = [this, observer = std::move(observer)](const char* effect, bool first,
-                                                           bool last) {
+  using When = StepStage::When;
+  const auto tell = [this, observer = std::move(observer)](const char* effect, When when) {
     static const std::vector<double> none;
-    observer({effect, first, last, now.start, now.length, now.active, turned,
+    observer({effect, when, now.start, now.length, now.active, turned,
               joints ? joints->impulses_at_end : none});
   };
   for (std::size_t k = 0; k < stages.size(); ++k)
     stages[k].run = [this, tell, k, run = std::move(stages[k].run)] {
       const char* effect = stages[k].effect;
-      if (k == 0) tell(effect, true, false);
+      if (k == 0) tell(effect, When::before_all);
       run();
-      if (end == SubStepEnd::whole) tell(effect, false, k + 1 == stages.size());
+      if (end == SubStepEnd::whole)
+        tell(effect, k + 1 == stages.size() ? When::after_all : When::between);
     };
 }
 

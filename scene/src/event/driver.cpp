@@ -75,14 +75,14 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
       local_(local_tolerance(options.tolerance)),
       motion_(model, options.tolerance, t, y),
       watcher_(motion_),
-      time_(t),
-      event_time_(t),
-      bounces_(at(model.contacts())),
-      lifted_(at(model.contacts())) {
-  y_.setZero(motion_.size());
-  y_.head(motion_.work()) = y;
+      time_(t) {
+  start_.time = t;
+  start_.bounces.resize(at(model.contacts()));
+  start_.lifted.resize(at(model.contacts()));
+  start_.y.setZero(motion_.size());
+  start_.y.head(motion_.work()) = y;
   counts_ = start.so_far;
-  model_.set(t, y_.data(), y_.data() + motion_.coordinates());
+  model_.set(t, start_.y.data(), start_.y.data() + motion_.coordinates());
   model_.settle();
   if (start.gap > 0) close_contacts(start);
   check_start();
@@ -91,13 +91,13 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   if (!events_.empty()) ++counts_.events;
   // Figures of a scene are rounded: its energy is that of the start which joints allow.
   const std::vector<ContactMode> modes = decide(touching(-1), {});
-  motion_.choose(t, y_, modes);
+  motion_.choose(t, start_.y, modes);
   motion_.set_levels(std::vector<double>(at(model_.contacts()), 0.0));
   motion_.leave_energy_free();
-  if (!move_onto_constraints(motion_, local_, t, y_))
+  if (!move_onto_constraints(motion_, local_, t, start_.y))
     throw std::invalid_argument("the start of the scene contradicts its joints or contacts");
-  model_.set(t, y_.data(), y_.data() + motion_.coordinates());
-  motion_.choose(t, y_, modes);
+  model_.set(t, start_.y.data(), start_.y.data() + motion_.coordinates());
+  motion_.choose(t, start_.y, modes);
   begin_phase();
 }
 
@@ -105,9 +105,9 @@ void Driver::check_start() const {
   VectorXd g, rate, rest;
   MatrixXd W;
   model_.joints(g, W, rate, rest);
-  const VectorXd u = y_.segment(motion_.coordinates(), motion_.velocities());
+  const VectorXd u = start_.y.segment(motion_.coordinates(), motion_.velocities());
   const VectorXd speeds = W * u + rate;
-  const double size = std::max(1.0, y_.head(motion_.coordinates()).cwiseAbs().maxCoeff());
+  const double size = std::max(1.0, start_.y.head(motion_.coordinates()).cwiseAbs().maxCoeff());
   const double speed = u.size() > 0 ? std::max(1.0, u.cwiseAbs().maxCoeff()) : 1;
   for (int i = 0; i < g.size(); ++i)
     if (std::abs(g[i]) > kStartTolerance * size || std::abs(speeds[i]) > kStartTolerance * speed)
@@ -231,7 +231,7 @@ bool Driver::repeat_phase() {
     tolerance = std::min(tolerance, graze_tolerance(options_.tolerance, std::abs(rate)));
   }
   if (!(tolerance < 0.5 * phase_->tolerance())) return false;
-  motion_.choose(event_time_, y_, modes_);
+  motion_.choose(start_.time, start_.y, start_.modes);
   start_phase(tolerance);
   return true;
 }
@@ -277,12 +277,12 @@ void Driver::check_pace(double t) const {
 void Driver::check_storm() {
   const double work = motion_.work_done();
   if (!(options_.end > 0) || work - storm_.work < options_.storm) return;
-  const double way = event_time_ - storm_.time, left = options_.end - event_time_;
+  const double way = start_.time - storm_.time, left = options_.end - start_.time;
   const long events = counts_.events - storm_.events;
   if (events >= kFewEvents && way * kMostStorms < left)
     fail(fmt::format("a storm of events: the last {} took {:.3g} s together, and {:.3g} s are left",
                      events, way * model_.time_unit(), left * model_.time_unit()));
-  storm_ = {work, event_time_, counts_.events};
+  storm_ = {work, start_.time, counts_.events};
 }
 
 // A phase without events may be long; a saved state is arrived at again from its start. Where
@@ -290,29 +290,13 @@ void Driver::check_storm() {
 void Driver::anchor() {
   paced_.steps += phase_->counts().steps;
   paced_.way += phase_->step_end();
-  event_time_ = phase_->is_at_end() ? kink_ : phase_->start() + phase_->step_end();
-  phase_->projected_at(phase_->step_end(), y_);
+  start_.time = phase_->is_at_end() ? kink_ : phase_->start() + phase_->step_end();
+  phase_->projected_at(phase_->step_end(), start_.y);
   // Rows that were not in use are met by what the others leave of them only.
-  motion_.choose(event_time_, y_, modes_);
-  const VectorXd before = y_;
-  if (!move_onto_constraints(motion_, local_, event_time_, y_)) y_ = before;
+  motion_.choose(start_.time, start_.y, start_.modes);
+  const VectorXd before = start_.y;
+  if (!move_onto_constraints(motion_, local_, start_.time, start_.y)) start_.y = before;
   start_phase();
-}
-
-Driver::Memory Driver::memory() const {
-  Memory out{event_time_,
-             motion_.kept_energy(),
-             y_,
-             modes_,
-             motion_.levels(),
-             bounces_,
-             {},
-             lifted_,
-             at_one_time_,
-             counts_.events,
-             counts_.impacts};
-  for (int i = 0; i < model_.contacts(); ++i) out.axes.push_back(model_.axis(i));
-  return out;
 }
 
 Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
@@ -322,27 +306,23 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
       motion_(model, options.tolerance, memory.time, memory.y),
       watcher_(motion_),
       time_(memory.time),
-      event_time_(memory.time),
-      y_(memory.y),
-      bounces_(memory.bounces),
-      at_one_time_(memory.at_one_time),
-      lifted_(memory.lifted) {
+      start_(memory) {
   counts_.events = memory.events;
   counts_.impacts = memory.impacts;
   for (std::size_t i = 0; i < memory.axes.size(); ++i)
     model_.set_axis(static_cast<int>(i), memory.axes[i]);
-  model_.set(time_, y_.data(), y_.data() + motion_.coordinates());
+  model_.set(time_, start_.y.data(), start_.y.data() + motion_.coordinates());
   model_.settle();
   motion_.keep_energy(memory.kept_energy);
-  motion_.choose(time_, y_, memory.modes);
+  motion_.choose(time_, start_.y, memory.modes);
   motion_.set_levels(memory.levels);
   start_phase();
 }
 
 VectorXd Driver::state() {
-  VectorXd y = y_;
+  VectorXd y = start_.y;
   // A run that gives up within an event has no phase there yet.
-  const double since = time_ - event_time_;
+  const double since = time_ - start_.time;
   if (since > 0 && phase_->step_end() > 0)
     phase_->projected_at(std::min(std::max(since, phase_->step_begin()), phase_->step_end()), y);
   model_.set(time_, y.data(), y.data() + motion_.coordinates());
@@ -369,17 +349,17 @@ void Driver::turn_slips() {
 void Driver::handle(const Zero& zero) {
   paced_ = {};
   const double now = phase_->start() + zero.time;
-  at_one_time_ = now > event_time_ ? 0 : at_one_time_ + 1;
-  if (at_one_time_ == 0) lifted_.assign(lifted_.size(), false);
-  if (zero.what == Watch::normal_force) lifted_[at(zero.contact)] = true;
-  if (at_one_time_ > kMostAtOneTime)
+  start_.at_one_time = now > start_.time ? 0 : start_.at_one_time + 1;
+  if (start_.at_one_time == 0) start_.lifted.assign(start_.lifted.size(), false);
+  if (zero.what == Watch::normal_force) start_.lifted[at(zero.contact)] = true;
+  if (start_.at_one_time > kMostAtOneTime)
     fail(fmt::format("more than {} events at one time", kMostAtOneTime));
   if (++counts_.events > options_.max_events)
     fail(fmt::format("max_events = {} events are over", options_.max_events));
-  event_time_ = now;
+  start_.time = now;
   check_storm();
-  y_ = zero.y;
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  start_.y = zero.y;
+  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
   model_.settle();
   const bool closing = zero.what == Watch::gap;
   const std::vector<int> close = touching(zero.contact);
@@ -393,7 +373,7 @@ void Driver::handle(const Zero& zero) {
            zero.contact);
   std::vector<ContactMode> modes = decide(close, closing ? Left() : Left{zero.contact, zero.what});
   if (zero.what == Watch::support) record_changes(modes_before, modes, zero.lag);
-  motion_.choose(event_time_, y_, std::move(modes));
+  motion_.choose(start_.time, start_.y, std::move(modes));
   begin_phase();
 }
 
@@ -429,11 +409,11 @@ Counts Driver::counts() const {
 
 void Driver::begin_phase() {
   settle_velocities();
-  motion_.keep_energy_of(event_time_, y_);
-  const VectorXd before = y_;
-  if (!move_onto_constraints(motion_, local_, event_time_, y_)) {
-    y_ = before;
-    model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  motion_.keep_energy_of(start_.time, start_.y);
+  const VectorXd before = start_.y;
+  if (!move_onto_constraints(motion_, local_, start_.time, start_.y)) {
+    start_.y = before;
+    model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
     fail(contradiction());
   }
   start_phase();
@@ -460,18 +440,19 @@ std::string Driver::contradiction() const {
 // Removes the normal velocities, less than their bands, that contacts have when they close.
 void Driver::settle_velocities() {
   const double energy = model_.energy();
-  motion_.settle_velocities(event_time_, y_);
+  motion_.settle_velocities(start_.time, start_.y);
   const double lost = energy - model_.energy();
-  if (!events_.empty() && events_.back().time == event_time_) events_.back().lost += lost;
+  if (!events_.empty() && events_.back().time == start_.time) events_.back().lost += lost;
 }
 
-// Everything from (event_time_, y_), the modes and the energy that is kept: whoever has these goes
-// on with the same bits.
+// Everything from (start_.time, start_.y), the modes and the energy that is kept: whoever has these
+// goes on with the same bits.
 void Driver::start_phase(double most) {
-  modes_ = motion_.modes();
-  model_.begin_anew(event_time_);
-  motion_.choose(event_time_, y_, modes_);
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  start_.modes = motion_.modes();
+  start_.axes.resize(start_.modes.size());
+  model_.begin_anew(start_.time);
+  motion_.choose(start_.time, start_.y, start_.modes);
+  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
   std::vector<bool> leaving(at(model_.contacts()), false);
   double local = std::min(local_, most);
   for (int i = 0; i < model_.contacts(); ++i) {
@@ -486,10 +467,15 @@ void Driver::start_phase(double most) {
   if (phase_) counts_ += phase_->counts();
   phase_.reset();
   const double first = longest_first_step(leaving);
-  kink_ = model_.next_kink(event_time_);
-  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, event_time_, y_, first,
-                                   kink_ - event_time_);
-  watcher_.begin(event_time_, y_, leaving);
+  kink_ = model_.next_kink(start_.time);
+  start_.levels = motion_.levels();
+  start_.kept_energy = motion_.kept_energy();
+  start_.events = counts_.events;
+  start_.impacts = counts_.impacts;
+  for (int i = 0; i < model_.contacts(); ++i) start_.axes[at(i)] = model_.axis(i);
+  phase_ = std::make_unique<Phase>(motion_, local, options_.max_step, start_.time, start_.y, first,
+                                   kink_ - start_.time);
+  watcher_.begin(start_.time, start_.y, leaving);
   next_.reset();
   above_from_ = kInfinity;
 }
@@ -504,7 +490,7 @@ double Driver::slowest_turn() {
     if (motion_.modes()[at(i)].mode != Mode::slide || model_.law(i).friction == 0) continue;
     if (rate.size() == 0) {
       rate.resize(motion_.size());
-      motion_.rate(event_time_, y_.data(), rate.data());
+      motion_.rate(start_.time, start_.y.data(), rate.data());
     }
     if (motion_.slip(at_once).norm() > bands().slip(i)) continue;
     const double turns = motion_.slip_rate(at_once).norm();
@@ -517,7 +503,7 @@ double Driver::slowest_turn() {
 // and the ways of contacts that are about to close.
 double Driver::longest_first_step(const std::vector<bool>& leaving) {
   VectorXd rate(motion_.size());
-  motion_.rate(event_time_, y_.data(), rate.data());
+  motion_.rate(start_.time, start_.y.data(), rate.data());
   const VectorXd a = motion_.acceleration();
   const double part = std::min(1e-3, std::sqrt(kFlightError * options_.tolerance));
   double longest = 0;
@@ -570,14 +556,14 @@ void Driver::close_contacts(const StartState& start) {
     modes[at(i)].mode = Mode::slide;
     modes[at(i)].direction = VectorXd::Unit(model_.tangents(), 0);
   }
-  motion_.choose(time_, y_, std::move(modes));
-  motion_.settle_velocities(time_, y_);
+  motion_.choose(time_, start_.y, std::move(modes));
+  motion_.settle_velocities(time_, start_.y);
   motion_.set_levels(std::vector<double>(at(model_.contacts()), 0.0));
   motion_.leave_energy_free();
-  if (!move_onto_constraints(motion_, local_, time_, y_))
+  if (!move_onto_constraints(motion_, local_, time_, start_.y))
     throw SimulationError("contacts of a step cannot be closed together");
-  motion_.choose(time_, y_, std::vector<ContactMode>(at(model_.contacts())));
-  model_.set(time_, y_.data(), y_.data() + motion_.coordinates());
+  motion_.choose(time_, start_.y, std::vector<ContactMode>(at(model_.contacts())));
+  model_.set(time_, start_.y.data(), start_.y.data() + motion_.coordinates());
   model_.settle();
 }
 

@@ -62,10 +62,24 @@ class Driver {
   Driver(Model& model, const DriverOptions& options, double t, const VectorXd& y,
          const StartState& start = {});
 
+  /// The start of a phase: all that it depends on. IDA's history is not in it: a phase is repeated
+  /// from its start.
+  struct Memory {
+    double time = 0, kept_energy = 0;
+    VectorXd y;                      ///< q, u, work of forces without potential
+    std::vector<ContactMode> modes;  ///< there; directions of slip turn since
+    std::vector<double> levels;      ///< gaps of closed contacts
+    std::vector<Bounces> bounces;
+    std::vector<int> axes;     ///< of the tangents of each contact
+    std::vector<bool> lifted;  ///< contacts whose forces have vanished at this time
+    long at_one_time = 0, events = 0, impacts = 0;
+
+    /// Numbers are finite, counts are counts.
+    bool is_sound() const;
+  };
   /// Goes on with the bits of the driver that made the memory.
-  struct Memory;
   Driver(Model& model, const DriverOptions& options, const Memory& memory);
-  Memory memory() const;  ///< of the start of the present phase
+  const Memory& memory() const { return start_; }  ///< of the present phase
 
   /// Told of each impact: its contacts, their impulses by row, those that end accumulating impacts
   /// (or none), and the velocities before. `exact`: its velocities obey the law of impacts.
@@ -140,7 +154,7 @@ class Driver {
   void turn_slips();
   EventKind slip_of(int contact, bool begins) const;
   void record(EventKind kind, int contact, double before = 0, double after = 0, double lost = 0) {
-    events_.push_back({event_time_, kind, contact, before, after, lost});
+    events_.push_back({start_.time, kind, contact, before, after, lost});
   }
   void record_changes(const std::vector<ContactMode>& before, const std::vector<ContactMode>& after,
                       double lag);
@@ -151,14 +165,12 @@ class Driver {
   double local_;  // tolerance of IDA
   Motion motion_;
   Watcher watcher_;
-  double time_, event_time_;
-  double kink_ = 0;                 // the next one of forces
-  VectorXd y_;                      // at the start of the phase
-  std::vector<ContactMode> modes_;  // there; directions of slip turn since
+  double time_;
+  double kink_ = 0;  // the next one of forces
+  Memory start_;     // of the phase; within an event its time and state
   std::unique_ptr<Phase> phase_;
   std::optional<Zero> next_;
   double above_from_ = kInfinity;  // since the start of the phase
-  std::vector<Bounces> bounces_;
   std::vector<EventRecord> events_;
   Counts counts_;
   struct {
@@ -168,10 +180,8 @@ class Driver {
   struct {
     double work = 0, time = 0;
     long events = 0;
-  } storm_;  // where the work was checked last
-  long at_one_time_ = 0;
-  std::vector<bool> lifted_;  // at the time of the last event, whose forces vanished
-  Struck struck_;             // empty: nobody asks
+  } storm_;        // where the work was checked last
+  Struck struck_;  // empty: nobody asks
 };
 
 /// An impact of contacts that touch: the right hand side of its problem w = A x - b.
@@ -180,21 +190,6 @@ struct Driver::Impact {
   std::vector<bool> hits;  ///< they close, and fast enough to count
   VectorXd rest;           ///< > 0: the contact's impacts are over after this time, s
   double fastest = 0;      ///< of those that are over: speed of approach
-};
-
-/// All that a phase depends on. IDA's history is not in it: a phase is repeated from its start.
-struct Driver::Memory {
-  double time = 0, kept_energy = 0;
-  VectorXd y;
-  std::vector<ContactMode> modes;
-  std::vector<double> levels;  ///< gaps of closed contacts
-  std::vector<Bounces> bounces;
-  std::vector<int> axes;     ///< of the tangents of each contact; of an older state: none
-  std::vector<bool> lifted;  ///< whose forces have vanished at this time
-  long at_one_time = 0, events = 0, impacts = 0;
-
-  /// Numbers are finite, counts are counts.
-  bool is_sound() const;
 };
 
 }  // namespace tether::scene::event

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "bounds.hpp"
 #include "event/resumable.hpp"
 #include "output/binary.hpp"
 #include "stepping/stepping_engine.hpp"
@@ -136,7 +137,7 @@ class EventsThenSteps final : public Engine {
 };
 
 void EventsThenSteps::advance(double t) {
-  const double slack = 1e-9 * step_;  // as the stepping engine has it
+  const double slack = kSameBoundary * step_;
   while (true) {
     if (!steps_) try {
         events_->advance(t);

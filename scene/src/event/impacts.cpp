@@ -32,23 +32,23 @@ constexpr double kLeastApproach = 1e-12;  // of the slip
 }  // namespace
 
 void Driver::remember(int contact, double approach) {
-  Bounces& b = bounces_[at(contact)];
-  if (b.count > 0 && b.time[0] == event_time_) return;
+  Bounces& b = start_.bounces[at(contact)];
+  if (b.count > 0 && b.time[0] == start_.time) return;
   for (int k = 2; k > 0; --k) {
     b.time[k] = b.time[k - 1];
     b.speed[k] = b.speed[k - 1];
   }
-  b.time[0] = event_time_;
+  b.time[0] = start_.time;
   b.speed[0] = approach;
   b.count = std::min(b.count + 1, 3);
 }
 
 bool Driver::has_accumulated(int contact, double approach, double& rest) const {
-  const Bounces& b = bounces_[at(contact)];
+  const Bounces& b = start_.bounces[at(contact)];
   if (b.count < 3) return false;
-  const double dt = event_time_ - b.time[0], last = b.time[0] - b.time[1];
+  const double dt = start_.time - b.time[0], last = b.time[0] - b.time[1];
   // Numbers of thousands, as of scenes in millimetres, lose heights at higher speeds.
-  const double largest = y_.head(motion_.coordinates()).cwiseAbs().maxCoeff();
+  const double largest = start_.y.head(motion_.coordinates()).cwiseAbs().maxCoeff();
   const bool unseen = approach * dt / 4 <= kLeastHeight * largest;
   if (approach * approach > b.speed[0] * std::max(options_.tolerance, kUnresolved) && !unseen)
     return false;
@@ -65,7 +65,7 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
 // Returns the energy that is lost.
 double Driver::come_to_rest(const std::vector<int>& touching, double speed, VectorXd& x) {
   ContactRows rows(model_, touching);
-  const VectorXd w = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
+  const VectorXd w = rows.velocities(start_.y.segment(motion_.coordinates(), motion_.velocities()));
   std::vector<int> slow;
   for (const ConePart& p : rows.parts()) {
     if (!p.has_normal() || std::abs(w[p.first]) > speed) continue;
@@ -96,7 +96,7 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     const double unknown = model_.law(i).restitution > 0 ? 0 : kUnknownGap * bands().gap(i);
     const bool open = motion_.modes()[at(i)].mode == Mode::open;
     const bool now = i == first || !open || gap <= std::max(-rate * options_.tolerance, unknown);
-    const bool passes = open && i != first && motion_.passes_border(event_time_, y_, i);
+    const bool passes = open && i != first && motion_.passes_border(start_.time, start_.y, i);
     const bool hits = rate < -band && now && !passes;
     const bool rests = std::abs(rate) <= band && !passes && together;
     if (hits || rests) out.push_back(i);
@@ -166,7 +166,7 @@ void Driver::refuse_blocked(const ContactRows& rows, const Impact& impact) {
 
 void Driver::strike(const std::vector<int>& set, bool plastic) {
   ContactRows rows(model_, set);
-  const auto u = y_.segment(motion_.coordinates(), motion_.velocities());
+  const auto u = start_.y.segment(motion_.coordinates(), motion_.velocities());
   const VectorXd before = rows.velocities(u);
   const Impact impact = expect(rows, before, plastic);
   refuse_blocked(rows, impact);
@@ -186,8 +186,8 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
 // Returns the energy that is lost.
 double Driver::change_velocities(const VectorXd& change) {
   const double energy = model_.energy();
-  y_.segment(motion_.coordinates(), motion_.velocities()) += change;
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  start_.y.segment(motion_.coordinates(), motion_.velocities()) += change;
+  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
   return energy - model_.energy();
 }
 
@@ -206,7 +206,7 @@ void Driver::record_impacts(const ContactRows& rows, const Impact& impact, const
     record(over ? EventKind::rest : EventKind::impact, contact, before[p.first], after[p.first],
            first ? lost : 0);
     events_.back().impulse = model_.in_space(contact, rows.of(k, x));
-    if (over) events_.back().time = event_time_ + impact.rest[k];
+    if (over) events_.back().time = start_.time + impact.rest[k];
     first = false;
   }
 }
@@ -216,12 +216,12 @@ void Driver::record_impacts(const ContactRows& rows, const Impact& impact, const
 std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const Left& left,
                                         bool may_jam) {
   std::vector<ContactMode> modes(at(model_.contacts()));
-  model_.set(event_time_, y_.data(), y_.data() + motion_.coordinates());
+  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
   const std::vector<int> candidates = staying(touching, left);
   if (candidates.empty()) return modes;
   ContactRows rows(model_, candidates);
   const VectorXd velocities =
-      rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
+      rows.velocities(start_.y.segment(motion_.coordinates(), motion_.velocities()));
   const std::vector<VectorXd> slides = slides_of(rows, velocities, left);
   ++counts_.contact_problems;
   std::vector<bool> closed;
@@ -277,7 +277,7 @@ std::vector<VectorXd> Driver::slides_of(const ContactRows& rows, const VectorXd&
     for (std::size_t c = 0; c < motion_.closed().size() && left.by == Watch::cone; ++c)
       if (motion_.closed()[c] == i) {
         VectorXd rate_there(motion_.size());
-        motion_.rate(event_time_, y_.data(), rate_there.data());
+        motion_.rate(start_.time, start_.y.data(), rate_there.data());
         out[at(k)] = -motion_.friction_force(static_cast<int>(c)).normalized();
       }
   }
@@ -292,7 +292,7 @@ bool Driver::lifts(const ContactRows& rows, int k, const AccelerationSolution& a
   if (forces.regimes[at(k)] == contact::Regime::separating) return true;
   bool lifted = false;
   for (int j = 0; j < model_.contacts() && !lifted; ++j)
-    lifted = lifted_[at(j)] && are_one(rows.contacts()[at(k)], j);
+    lifted = start_.lifted[at(j)] && are_one(rows.contacts()[at(k)], j);
   // Contacts whose forces vanish together lift together.
   const double force = forces.x[p.first];
   return lifted && (force <= kNoForce * forces.x.cwiseAbs().maxCoeff() ||
@@ -319,7 +319,7 @@ ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationSol
 bool Driver::leaves_its_feature(int contact) {
   const double band = bands().gap(contact);
   return model_.margin(contact) <= band &&
-         motion_.margin_rate(event_time_, y_, contact) < -bands().approach(contact);
+         motion_.margin_rate(start_.time, start_.y, contact) < -bands().approach(contact);
 }
 
 // Forces without bound stop the slip in no time: the impulses that keep the contacts from closing
@@ -334,10 +334,12 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities) {
   const FrictionSolution answer = solve_friction(problem);
   if (!answer.solved) fail("an impact without collision is not solved");
   const VectorXd coming =
-      struck_ ? VectorXd(y_.segment(motion_.coordinates(), motion_.velocities())) : VectorXd();
+      struck_ ? VectorXd(start_.y.segment(motion_.coordinates(), motion_.velocities()))
+              : VectorXd();
   const double lost = change_velocities(rows.change(answer.x));
   if (struck_) struck_(rows, answer.x, {}, coming, false);
-  const VectorXd after = rows.velocities(y_.segment(motion_.coordinates(), motion_.velocities()));
+  const VectorXd after =
+      rows.velocities(start_.y.segment(motion_.coordinates(), motion_.velocities()));
   bool first = true;
   for (int k = 0; k < static_cast<int>(rows.parts().size()); ++k) {
     const ConePart& p = rows.parts()[at(k)];

@@ -53,7 +53,6 @@ void JointRows::couple(const Scene& scene, const Bodies& bodies) {
       part.joint = j;
       part.row = count_;
       part.has_length = slides;
-      part.is_first = k == 0;
       part.polynomial = parts[k];
       std::get<std::vector<Relation>>(rows_).push_back(std::move(part));
     }

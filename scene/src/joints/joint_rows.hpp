@@ -123,12 +123,13 @@ class RowBuilder {
 
 template <int order>
 void JointRows::values(const Bodies& bodies, double* g) const {
+  for (const Turn& each : turns_) g[each.row] = 0;
   each([&](const auto& row) {
     const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
     if constexpr (std::is_same_v<std::decay_t<decltype(row)>, Relation>) {
-      const double before = row.is_first ? 0 : g[row.row];
-      row.template rows<order>(A, B, g + row.row);
-      g[row.row] += before;
+      double part = 0;
+      row.template rows<order>(A, B, &part);
+      g[row.row] += part;
     } else {
       row.template rows<order>(A, B, g + row.row);
     }

@@ -173,7 +173,6 @@ struct Distance : Row {
 struct Relation : Row {
   static constexpr int count = 1;
   bool has_length = false;
-  bool is_first = true;  // of the parts of its row
   Coordinate coordinate;
   std::vector<double> polynomial;  // from degree 1 on
 

@@ -67,9 +67,10 @@ void StepScribe::take_states(std::vector<BodyState>& out) const {
 }
 
 void StepScribe::see(const contact::StepStage& stage) {
-  if (stage.first) return begin_part(stage);
+  using When = contact::StepStage::When;
+  if (stage.when == When::before_all) return begin_part(stage);
   after_stage(stage);
-  if (stage.last) end_part(stage);
+  if (stage.when == When::after_all) end_part(stage);
 }
 
 void StepScribe::begin_part(const contact::StepStage& stage) {

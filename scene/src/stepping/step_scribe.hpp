@@ -1,13 +1,11 @@
 // Tether: writes what steps do to the certificate. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "bounds.hpp"
 #include "certificate/sheet.hpp"
 #include "stepping_engine.hpp"
 
 namespace tether::scene::stepping {
-
-/// A time so near, in steps, is that of a boundary up to rounding.
-constexpr double kSameBoundary = 1e-9;
 
 /// Observes the stages of each sub-step. A sub-step that the stepper takes back is known by the
 /// next one, which begins where that one began; an impact at which a step is cut, and what an

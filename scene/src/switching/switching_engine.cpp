@@ -13,6 +13,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "bounds.hpp"
+#include "joints/window_rules.hpp"
 #include "output/binary.hpp"
 #include "switching.hpp"
 
@@ -25,8 +27,6 @@ using linalg::at;
 using Kind = ContactEvent::Kind;
 
 constexpr binary::Magic kSwitched = {'s', 'w', 'i', 't', 'c', 'h', ' ', '1'};
-constexpr double kBoundary = 1e-9;  // of a step, and of a time: it is reached
-
 enum class Status : std::uint8_t { waiting, holding, over };
 
 /// Reaction over its bound.
@@ -36,24 +36,10 @@ double load_of(const JointWindow& window, const JointForce& force) {
 }
 
 void check(const Scene& scene) {
-  const auto refuse = [](const Joint& joint, const char* why) {
-    throw std::invalid_argument("joint \"" + joint.name + "\": " + why);
-  };
-  for (const Joint& joint : scene.joints) {
-    if (!joint.window) continue;
-    const JointWindow& w = *joint.window;
-    if (!(w.from >= 0) || !(w.to > w.from)) refuse(joint, "from must be >= 0 and below to");
-    if (!(w.break_force > 0) || !(w.break_moment > 0))
-      refuse(joint, "break_force and break_moment must be > 0");
-    if (w.from > 0 && joint.motion) refuse(joint, "what closes later has no motion");
-  }
-  for (const Coupling& coupling : scene.couplings)
-    for (const int j : coupling.joints)
-      if (const Joint& joint = scene.joints[at(j)]; joint.window)
-        refuse(joint, "a coupling names it, whose joints hold always");
-  if (goes_on_in_steps(scene))
-    throw std::invalid_argument(
-        "[event] otherwise = \"stepping\" is not for scenes whose joints attach, detach or break");
+  joints::check_windows(scene, [](const Place&, const std::string& field, const std::string& value,
+                                  const std::string& why) {
+    throw std::invalid_argument(field + " = " + value + " " + why);
+  });
 }
 
 class SwitchingEngine final : public Engine {
@@ -206,7 +192,7 @@ double SwitchingEngine::next_switch() const {
 }
 
 bool SwitchingEngine::is_due(double time) const {
-  return this->time() >= time - kBoundary * std::min(step_, time);
+  return this->time() >= time - kSameBoundary * std::min(step_, time);
 }
 
 // An engine that has stopped early for no interruption is where a joint breaks; one of steps is at

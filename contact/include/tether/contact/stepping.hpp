@@ -114,12 +114,18 @@ struct Meeting {
   std::optional<double> friction_across = {};
   /// Coefficient of contacts that hold, at least `friction`, which is then that of those that slip
   /// and of impacts. A contact holds at the end of a step if this coefficient can hold it there.
-  /// Not with friction_across. Absent: `friction`.
+  /// With friction_across it is along the axis, and both grow by the same factor. Absent:
+  /// `friction`.
   std::optional<double> static_friction = {};
   /// Whether the coefficients differ.
   bool is_elliptic() const { return friction_across && *friction_across != friction; }
   /// The larger coefficient.
   double largest_friction() const { return std::max(friction, friction_across.value_or(0)); }
+  /// The larger coefficient of contacts that hold.
+  double largest_holding() const {
+    if (!static_friction) return largest_friction();
+    return is_elliptic() ? *static_friction / friction * largest_friction() : *static_friction;
+  }
 };
 
 /// Velocities changed by forces during a step of length dt that starts at `time`.
@@ -285,9 +291,9 @@ struct StageCost {
 
 /// A sub-step as an observer sees it between two of its stages (Stepper::observe).
 struct StepStage {
+  enum class When : std::uint8_t { before_all, between, after_all };
   const char* effect;               ///< of the stage that has run, as StageCost
-  bool first;                       ///< none has run yet
-  bool last;                        ///< all have: bodies() are those of its end
+  When when;                        ///< after all: bodies() are those of its end
   double start, length;             ///< s
   const std::vector<char>* active;  ///< bodies that take part; null: all
   /// Contacts as the problem had them: bias and slip hold in the middle of the sub-step.

@@ -2,6 +2,7 @@
 //
 // The engine of switching/ moves them; here are their fields.
 #include "joints/joint_type.hpp"
+#include "joints/window_rules.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
@@ -11,7 +12,6 @@ namespace {
 constexpr Unit kSeconds{"s", 0, 0, 1};
 constexpr const char* kKeys[] = {"from", "to", "break_force", "break_moment"};
 
-bool has_window(const Joint& joint) { return joint.window.has_value(); }
 bool switches(const Joint& joint) {
   return joint.window && (joint.window->from > 0 || std::isfinite(joint.window->to));
 }
@@ -33,12 +33,10 @@ struct JointWindowEffect : Effect {
     number("to", w.to, kSeconds);
     number("break_force", w.break_force, kForce);
     number("break_moment", w.break_moment, kMoment);
-    if (in && w.from > 0)
-      for (const char* key : {"length", "motion"})
-        if (in->has(key))
-          in->wrong(key,
-                    "is of a joint that holds from the start: one that attaches later takes "
-                    "its bodies as they are then");
+    if (in && w.from > 0 && in->has("length"))
+      in->wrong("length",
+                "is of a joint that holds from the start: one that attaches later takes its bodies "
+                "as they are then");
     const bool has_moment = joint.kind != JointKind::distance &&
                             (joint.kind != JointKind::ball || joint.spring.has_value());
     if (in && in->has("break_moment") && !has_moment)
@@ -48,22 +46,7 @@ struct JointWindowEffect : Effect {
   }
 
   void check(const Scene& scene, Report& report) const override {
-    if (!any_of(scene.joints, has_window)) return;
-    for (const Joint& joint : scene.joints) {
-      if (!joint.window || joint.window->to > joint.window->from) continue;
-      report.add(joint.place, fmt::format("joint \"{}\": to", joint.name),
-                 fmt::format("{}", joint.window->to),
-                 fmt::format("must be after from, {} s", joint.window->from));
-    }
-    for (const Coupling& coupling : scene.couplings)
-      for (const int j : coupling.joints)
-        if (scene.joints[at(j)].window)
-          report.add(coupling.place, fmt::format("coupling \"{}\": joints", coupling.name),
-                     fmt::format("\"{}\"", scene.joints[at(j)].name),
-                     "attaches, detaches or breaks; the joints of a coupling hold always");
-    if (goes_on_in_steps(scene))
-      report.add(scene.joints.front().place, "event: otherwise", "\"stepping\"",
-                 "is not for scenes whose joints attach, detach or break");
+    joints::check_windows(scene, [&](const auto&... problem) { report.add(problem...); });
   }
 
   void plan(const Scene& scene, EngineKind, Lines& lines) const override {
