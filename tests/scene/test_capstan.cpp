@@ -15,11 +15,11 @@ namespace capstan {
 
 constexpr double kFall = 9.81, kHeavy = 3, kLight = 2, kStiffness = 5000;
 
-std::string weight(const char* name, double mass, double z, double speed = 0) {
+std::string weight(const char* name, double mass, double z, double speed = 0, double x = 0) {
   return fmt::format(
-      "[[body]]\nname = \"{}\"\nmass = {}\ninertia = [0.1, 0.2, 0.3]\nposition = [0, 0, {}]\n"
+      "[[body]]\nname = \"{}\"\nmass = {}\ninertia = [0.1, 0.2, 0.3]\nposition = [{}, 0, {}]\n"
       "velocity = [0, 0, {}]\n",
-      name, mass, z, speed);
+      name, mass, x, z, speed);
 }
 
 /// Two weights on a rope over a drum at the origin, at rest in its tensions, whose sum this is.
@@ -195,14 +195,121 @@ TEST_CASE("a rope that rubs loses energy, and a slack one nothing") {
   }
 }
 
+/// The same over two drums, half a turn in all.
+std::string on_two_drums(const std::string& capstans, double tensions, double speed = 0,
+                         const char* more = "", const char* second = "world") {
+  return "[scene]\nend = 2\ngravity = [0, 0, -9.81]\n[output]\nforces = true\n" +
+         weight("heavy", kHeavy, -2, -speed) + weight("light", kLight, -5, speed, 1) + more +
+         fmt::format(
+             "[[cable]]\nname = \"rope\"\nbodies = [\"heavy\", \"world\", \"{}\", \"light\"]\n"
+             "at = [[0, 0, -2], [0, 0, 0], [1, 0, 0], [1, 0, -5]]\nstiffness = {}\nlength = {}\n"
+             "capstan = [{}]\n",
+             second, kStiffness, 8 - 0.5 * tensions / kStiffness, capstans);
+}
+std::string two_drums(double first, double second) {
+  return fmt::format("{{ ring = 1, friction = {} }}, {{ ring = 2, friction = {} }}", first, second);
+}
+
+TEST_CASE("a rope over two drums slips with tensions of the ratio of the sum of both wraps") {
+  for (const auto& [first, second] : {std::pair(0.05, 0.15), std::pair(0.2, 0.0)}) {
+    const double E = std::exp(0.5 * M_PI * (first + second)), a = slipping(E);
+    const Scene scene = scene_of(on_two_drums(two_drums(first, second), tensions(E)));
+    for (const EngineKind kind : kBoth) {
+      const auto run = engine_of(scene, kind, accuracy(kind));
+      run->advance(0.8);
+      INFO(run->name() << " " << first);
+      CHECK(std::abs(fall(*run) - 0.8 * a) < 1e-7);
+      CHECK(std::abs(run->bodies()[1].velocity.z() - 0.8 * a) < 1e-7);
+      CHECK(std::abs(rope(*run).tension / rope(*run).tension_second - E) < 1e-8);
+      CHECK(std::abs(rope(*run).tension - kHeavy * (kFall - a)) < 1e-5);
+    }
+  }
+}
+
+TEST_CASE("a rope over two drums holds as long as e^(mu times the sum of its wraps) is enough") {
+  const double least = std::log(kHeavy / kLight) / M_PI;
+  for (const EngineKind kind : kBoth)
+    for (const double part : {0.5, 1.0}) {
+      const double first = 1.001 * least * part, second = 2 * 1.001 * least - first;
+      const auto run =
+          engine_of(scene_of(on_two_drums(two_drums(first, second), (kHeavy + kLight) * kFall)),
+                    kind, accuracy(kind));
+      run->advance(1);
+      INFO(run->name() << " " << part);
+      CHECK(std::abs(down(*run)) < 1e-9);
+      CHECK(std::abs(rope(*run).tension - kHeavy * kFall) < 1e-6);
+      CHECK(std::abs(rope(*run).tension_second - kLight * kFall) < 1e-6);
+    }
+}
+
+TEST_CASE("a rope comes to rest on two drums, and holds there") {
+  const double E = factor(0.3), a = slipping(E), speed = 0.5, stop = -speed / a;
+  const Scene scene = scene_of(on_two_drums(two_drums(0.4, 0.2), tensions(E), speed));
+  for (const EngineKind kind : kBoth) {
+    const auto run = engine_of(scene, kind, accuracy(kind));
+    run->advance(0.5 * stop);
+    CHECK(std::abs(fall(*run) - 0.5 * speed) < (kind == EngineKind::event ? 1e-8 : 5e-3));
+    run->advance(stop + 0.3);
+    INFO(run->name() << " " << down(*run));
+    // Half of the weights swings on the rope: mm.
+    CHECK(std::abs(down(*run) + 0.5 * speed * speed / a) < 5e-3);
+    CHECK(std::abs(fall(*run) - run->bodies()[1].velocity.z()) < 0.1);
+    const double ratio = rope(*run).tension / rope(*run).tension_second;
+    CHECK(ratio < E);
+  }
+}
+
+TEST_CASE("a rope slips on one drum and turns the other one, on which it holds") {
+  constexpr double kRadius = 0.1, kInertia = 0.02;
+  const char* const pulley = R"(
+[[body]]
+name = "pulley"
+mass = 1
+inertia = [0.05, 0.02, 0.05]
+position = [1, 0, 0]
+[[joint]]
+name = "axle"
+kind = "hinge"
+bodies = ["pulley", "world"]
+at = [1, 0, 0]
+axis = [0, 1, 0]
+)";
+  const double E = std::exp(0.5 * M_PI * 0.1), inert = kInertia / kRadius / kRadius;
+  const double a = kFall * (kHeavy / E - kLight) / (kHeavy / E + kLight + inert);
+  const double first = kHeavy * (kFall - a), middle = first / E, second = kLight * (kFall + a);
+  const double least = std::log(middle / second) / (0.5 * M_PI);
+  for (const double mu : {1.05 * least, 0.6 * least}) {
+    const bool holds = mu > least;
+    // A pulley on which the rope slips is slower than the rope.
+    const double both = E * std::exp(0.5 * M_PI * mu), now = holds ? a : slipping(both);
+    const double T_0 = holds ? first : kHeavy * (kFall - now), T_2 = kLight * (kFall + now);
+    const double turns = holds ? a / kRadius : (T_0 / E - T_2) * kRadius / kInertia;
+    CHECK((holds || turns * kRadius < now));
+    const std::string capstans = fmt::format(
+        "{{ ring = 2, friction = {}, radius = {}, axis = [0, 1, 0] }}, {{ ring = 1, friction = 0.1 "
+        "}}",
+        mu, kRadius);
+    const Scene scene = scene_of(on_two_drums(capstans, T_0 + T_2, 0, pulley, "pulley"));
+    for (const EngineKind kind : kBoth) {
+      const auto run = engine_of(scene, kind, accuracy(kind));
+      run->advance(0.8);
+      INFO(run->name() << " " << holds);
+      CHECK(std::abs(fall(*run) - 0.8 * now) < 1e-6);
+      CHECK(std::abs(std::abs(run->bodies()[2].angular_velocity.y()) - 0.8 * turns) < 1e-5);
+      CHECK(std::abs(rope(*run).tension - T_0) < 1e-4);
+      CHECK(std::abs(rope(*run).tension_second - T_2) < 1e-4);
+    }
+  }
+}
+
 TEST_CASE("capstans are written, read again, planned, and refused by name") {
   Scene scene = scene_of(atwood(0.3, 10));
-  scene.springs[0].cable->capstan->wrap = 7.5;
+  scene.springs[0].cable->capstans[0].wrap = 7.5;
   const Scene again = parse_scene(write_scene(scene), "again");
   CHECK(write_scene(again) == write_scene(scene));
-  REQUIRE(again.springs[0].cable->capstan);
-  CHECK(again.springs[0].cable->capstan->friction == 0.3);
-  CHECK(again.springs[0].cable->capstan->wrap == 7.5);
+  REQUIRE(again.springs[0].cable->capstans.size() == 1);
+  CHECK(again.springs[0].cable->capstans[0].friction == 0.3);
+  CHECK(again.springs[0].cable->capstans[0].wrap == 7.5);
   const Plan plan = make_plan(scene);
   CHECK(plan.engine == EngineKind::stepping);
   bool planned = false;
@@ -212,6 +319,14 @@ TEST_CASE("capstans are written, read again, planned, and refused by name") {
   CHECK(thrown<std::invalid_argument>([&] {
           engine_of(scene, EngineKind::smooth, 1e-6);
         }).find("smooth") != std::string::npos);
+  const Scene two =
+      scene_of(on_two_drums("{ ring = 2, friction = 0.1 }, { ring = 1, friction = 0.2 }", 9));
+  REQUIRE(two.springs[0].cable->capstans.size() == 2);
+  CHECK(two.springs[0].cable->capstans[0].friction == 0.2);
+  CHECK(write_scene(parse_scene(write_scene(two), "again")) == write_scene(two));
+  CHECK(why_not(on_two_drums(two_drums(0.1, 0.2), 9)).empty());
+  CHECK(why_not(on_two_drums("{ ring = 1, friction = 0.1 }, { ring = 1, friction = 0.2 }", 9))
+            .find("ring 1 is there twice") != std::string::npos);
   const std::string good = atwood(0.3, 10);
   const auto refused = [&](const std::string& from, const std::string& to, const char* field) {
     std::string text = good;

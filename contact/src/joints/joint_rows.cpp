@@ -67,6 +67,12 @@ void JointLaws::add_bounded(int joint, double rate, double bound) {
   laws_.push_back({joint, false, 0, 0, rate, bound});
 }
 
+void JointLaws::set_bound(int law, double bound) {
+  Law& of = laws_[static_cast<std::size_t>(law)];
+  demand(bound >= 0 && std::isfinite(bound), of.joint, "bound", bound, ">= 0 and finite");
+  of.bound = bound;
+}
+
 void JointLaws::add_sprung(int joint, double stretch, double stiffness, double damping, double rate,
                            double bound) {
   demand(std::isfinite(stretch), joint, "stretch", stretch, "finite");

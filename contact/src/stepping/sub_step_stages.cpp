@@ -16,6 +16,7 @@ namespace {
 
 // Rounding of gaps in many steps, in parts of the positions.
 constexpr double kClosed = 1e3 * std::numeric_limits<double>::epsilon();
+constexpr int kMostRounds = 50;  // of bounds that follow impulses, which contract
 
 }  // namespace
 
@@ -107,12 +108,15 @@ void SubStepper::choose_bounces() {
 void SubStepper::solve_problem() {
   const bool holds = near && near->any_static();
   if (holds) hold_all();
-  for (;;) {
+  for (int round = 0;; ++round) {
     solver->solve(bodies.motion, turned, solution);
     ++counts.contact_problems;
     counts.sweeps += solution.sweeps;
     counts.assembled_islands += solution.assembled_islands;
-    if (!holds || !lets_slip()) return;
+    const bool slips = holds && lets_slip();
+    const bool changed =
+        acting_joints && round < kMostRounds && acting_joints->change_bounds(now.length);
+    if (!slips && !changed) return;
     solver->take_back();
   }
 }
@@ -120,8 +124,7 @@ void SubStepper::solve_problem() {
 // By the coefficient of contacts that hold; impacts have the other one.
 void SubStepper::hold_all() {
   impacts->each_other(turned.size(), [&](std::size_t k) {
-    const Meeting& m = near->meeting(turned[k]);
-    turned[k].mu = contacts.points[k].mu = m.static_friction.value_or(turned[k].mu);
+    turned[k].mu = contacts.points[k].mu = near->meeting(turned[k]).largest_holding();
   });
 }
 
@@ -132,7 +135,7 @@ bool SubStepper::lets_slip() {
   bool any = false;
   for (std::size_t k = 0; k < turned.size(); ++k) {
     PointContact& c = turned[k];
-    const double slips = near->meeting(c).friction;
+    const double slips = near->meeting(c).largest_friction();
     if (!(c.mu > slips)) continue;
     const auto velocity = [&](int body, const Vector3d& r) {
       return Vector3d(solution.velocities[at(body)] +

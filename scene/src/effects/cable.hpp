@@ -6,17 +6,16 @@
 //   tension T = max(0, k s + c ds/dt) where s > 0, else 0; where the cable rubs at a ring this is
 //   the mean of the tensions before and behind it
 //
-// With the lengths L_1 before and L_2 behind the ring, the tensions T_1 and T_2 there, their mean
-// T, the wrap angle beta and a pulley of radius r that turns with w about its axis u:
+// With the lengths L_1 before and L_2 behind a ring, the tensions T_1 and T_2 there, the wrap angle
+// beta and a pulley of radius r that turns with w about its axis u:
 //
 //   slip y' = L_2' - L_1' + winch - 2 r u.w       the cable feeds from its first end
-//   x = (T_1 - T_2) / 2,  |x| <= T tanh(mu beta / 2),  x opposes y', and is the bound where it
-//   slips
+//   x = (T_1 - T_2) / 2,  |x| <= (T_1 + T_2) / 2 tanh(mu beta / 2),  x opposes y', and is the bound
+//   where it slips
 //
-// which is e^(-mu beta) <= T_2 / T_1 <= e^(mu beta). T L' + x y' is the power of both tensions.
+// which is e^(-mu beta) <= T_2 / T_1 <= e^(mu beta). T is the mean of the tensions at the ends, so
+// that T L' + sum of x y' over the rings is the power of all tensions.
 #pragma once
-
-#include <map>
 
 #include "mechanics/effect.hpp"
 #include "mechanics/pair_forces.hpp"
@@ -139,6 +138,16 @@ struct CableItem {
     }
     act(points.back().body, left);
   }
+  /// Adds the wrench at one point, of both its pieces.
+  template <class Tension>
+  void add_wrench(const Bodies& bodies, std::size_t p, const Tension& tension,
+                  Wrench<double>& out) const {
+    Wrench<double> other = no_wrench<double>();
+    if (p > 0)
+      piece(bodies, p - 1).pull(frame(bodies, p - 1), frame(bodies, p), tension(p - 1), other, out);
+    if (p + 1 < points.size())
+      piece(bodies, p).pull(frame(bodies, p), frame(bodies, p + 1), tension(p), out, other);
+  }
 };
 
 /// The tension and its derivatives to length and rate.
@@ -166,43 +175,77 @@ struct CableTension {
       : CableTension(of, time, now.first, now.second) {}
 };
 
+/// The mean tension of a cable, and tanh(mu beta / 2) at one of its rings.
+struct Grip {
+  int cable;  // of the scene's springs
+  double mean, hold;
+  double bound() const { return mean * hold; }  ///< of the only ring
+};
+
+/// The bounds at the rings of cables that rub at several ones, where the tension after each ring is
+///
+///   T_j = T_j-1 - 2 x_j where it holds,   T_j-1 e^(-+ mu beta) where it slips
+///
+/// force(ring): x and 0 where it holds, 0 and the sign of x where it slips. `loaded`: 1; 0: what
+/// forces alone make of the bounds, which are affine in them. put(ring, bound).
+template <class Force, class Put>
+void share_tensions(const std::vector<Grip>& rings, double loaded, const Force& force,
+                    const Put& put) {
+  const auto passed = [&](std::size_t j, double tension, double rest) {
+    const auto [x, slips] = force(j);
+    const double part = slips * rings[j].hold;
+    return std::pair(tension * (1 - part) / (1 + part), rest * (1 - part) / (1 + part) - 2 * x);
+  };
+  for (std::size_t first = 0, end = 0; first < rings.size(); first = end) {
+    while (end < rings.size() && rings[end].cable == rings[first].cable) ++end;
+    if (end - first < 2) continue;
+    double share = 1, rest = 0;  // the last tension: share T_0 + rest
+    for (std::size_t j = first; j < end; ++j) std::tie(share, rest) = passed(j, share, rest);
+    double tension = (2 * loaded * rings[first].mean - rest) / (1 + share);
+    for (std::size_t j = first; j < end; ++j) {
+      const auto [slipped, held] = passed(j, tension, 0);
+      put(j, rings[j].hold * 0.5 * (tension + slipped + held));
+      tension = slipped + held;
+    }
+  }
+}
+
+/// The slip of a cable at one of its rings.
 class CapstanSlip {
  public:
   /// `bodies`: at t = 0.
-  CapstanSlip(const Spring& spring, std::size_t number, const Bodies& bodies);
+  CapstanSlip(const Spring& spring, std::size_t number, const Capstan& law, const Bodies& bodies);
 
   int cable() const { return static_cast<int>(item_.index); }  ///< of the scene's springs
   /// y' is rate() less this.
   double wanted() const { return -item_.winch; }
-  double bound(const Bodies& bodies) const;
+  Grip grip(const Bodies& bodies) const;
   double rate(const Bodies& bodies) const;
   /// The rate of rate() without accelerations of the bodies.
   double rest(const Bodies& bodies) const;
   /// The loads of x = 1: f(body, wrench) once for each body that moves.
   template <class F>
   void each_load(const Bodies& bodies, const F& f) const {
-    std::map<int, Wrench<double>> loads;
-    item_.each_wrench(
-        bodies, [this](std::size_t k) { return sign(k); },
-        [&](int body, const Wrench<double>& wrench) {
-          Wrench<double>& sum = loads.try_emplace(body, no_wrench<double>()).first->second;
-          sum.force += wrench.force;
-          sum.torque += wrench.torque;
-        });
-    loads.at(ring().body).torque -=
-        2 * law_.radius * (item_.frame(bodies, at(law_.ring)).R * axis_);
-    for (const auto& [body, wrench] : loads)
-      if (bodies.moves(body)) f(body, wrench);
+    for (const int body : moving_) {
+      Wrench<double> sum = no_wrench<double>();
+      for (std::size_t p = 0; p < item_.points.size(); ++p)
+        if (item_.points[p].body == body)
+          item_.add_wrench(
+              bodies, p, [this](std::size_t k) { return sign(k); }, sum);
+      if (item_.points[at(law_.ring)].body == body)
+        sum.torque -= 2 * law_.radius * (item_.frame(bodies, at(law_.ring)).R * axis_);
+      f(body, sum);
+    }
   }
 
  private:
-  const CablePoint& ring() const { return item_.points[at(law_.ring)]; }
   /// Sign of a piece: 1 before the ring, -1 behind it.
   double sign(std::size_t piece) const { return piece < at(law_.ring) ? 1 : -1; }
 
   CableItem item_;
   Capstan law_;
-  Vector3d axis_;  // of the pulley, in axes of the ring's body
+  Vector3d axis_;            // of the pulley, in axes of the ring's body
+  std::vector<int> moving_;  // bodies, ascending
 };
 
 }  // namespace tether::scene::effects

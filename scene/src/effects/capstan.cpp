@@ -7,20 +7,24 @@
 
 namespace tether::scene::effects {
 
-CapstanSlip::CapstanSlip(const Spring& spring, std::size_t number, const Bodies& bodies)
-    : item_(spring, number, bodies), law_(*spring.cable->capstan) {
+CapstanSlip::CapstanSlip(const Spring& spring, std::size_t number, const Capstan& law,
+                         const Bodies& bodies)
+    : item_(spring, number, bodies), law_(law) {
   axis_ = direction_in(item_.frame(bodies, at(law_.ring)), law_.axis);
+  for (const CablePoint& each : item_.points)
+    if (bodies.moves(each.body)) moving_.push_back(each.body);
+  sort_unique(moving_);
 }
 
 // |u - v| / |u + v| is the tangent of half the angle between the pieces.
-double CapstanSlip::bound(const Bodies& bodies) const {
+Grip CapstanSlip::grip(const Bodies& bodies) const {
   double wrap = law_.wrap.value_or(0);
   if (!law_.wrap) {
     const Vector3d u = item_.piece(bodies, at(law_.ring) - 1).along,
                    v = item_.piece(bodies, at(law_.ring)).along;
     wrap = 2 * std::atan2((u - v).norm(), (u + v).norm());
   }
-  return CableTension(item_, bodies).tension * std::tanh(0.5 * law_.friction * wrap);
+  return {cable(), CableTension(item_, bodies).tension, std::tanh(0.5 * law_.friction * wrap)};
 }
 
 double CapstanSlip::rate(const Bodies& bodies) const {
@@ -49,32 +53,37 @@ double CapstanSlip::rest(const Bodies& bodies) const {
 
 namespace {
 
-bool rubs(const Spring& spring) { return spring.cable && spring.cable->capstan; }
+bool rubs(const Spring& spring) { return spring.cable && !spring.cable->capstans.empty(); }
+
+constexpr const char* kKey = "capstan";
 
 struct CapstanEffect : Effect {
   void cable_fields(const Form& form, Cable& cable) const override {
-    const int rings = static_cast<int>(cable.rings.size());
-    form.table("capstan", cable.capstan, [&](const Form& in, Capstan& capstan) {
-      in.count("ring", capstan.ring, 1, std::max(rings, 1));
-      if (in.in() && rings == 0)
-        in.in()->wrong("ring", "the cable has no ring between its ends to rub at");
-      if (in.in() && rings > 1) in.require("ring", "which of its rings, from 1 on");
-      in.require("friction", "a coefficient");
-      coefficient(in, "friction", capstan.friction, {});
-      wrap(in, capstan.wrap);
-      in.number("radius", capstan.radius, kNotNegative, kMetres);
-      if (in.in() ? in.in()->has("axis") : capstan.radius > 0) in.direction("axis", capstan.axis);
-      if (in.in() && capstan.radius > 0) in.require("axis", "of the pulley, world axes at t = 0");
-    });
+    if (Fields* in = form.in()) {
+      read(*in, *form.reader(), cable);
+    } else if (form.units()) {
+      for (Capstan& each : cable.capstans) one(form, cable, each);
+    } else if (!cable.capstans.empty()) {
+      std::vector<std::string> tables;
+      for (Capstan& each : cable.capstans) {
+        Writer inside(Writer::Layout::inside);
+        one(Form(inside, form.scene()), cable, each);
+        tables.push_back("{ " + inside.take() + " }");
+      }
+      form.out()->raw(kKey, tables.size() == 1 ? tables[0] : in_brackets(tables));
+    }
   }
   void check(const Scene& scene, Report& report) const override {
-    for (const Spring& each : scene.springs)
-      if (rubs(each) && each.cable->capstan->radius > 0 &&
-          at(each.cable->capstan->ring) <= each.cable->rings.size() &&
-          !scene.moves(each.cable->rings[at(each.cable->capstan->ring) - 1].body))
-        report.add(each.place, fmt::format("cable \"{}\": capstan.radius", each.name),
-                   fmt::format("{}", each.cable->capstan->radius),
-                   "is of a pulley that turns, and the body of its ring is fixed");
+    for (const Spring& spring : scene.springs) {
+      if (!rubs(spring)) continue;
+      const std::vector<Ring>& rings = spring.cable->rings;
+      for (const Capstan& each : spring.cable->capstans)
+        if (each.radius > 0 && at(each.ring) <= rings.size() &&
+            !scene.moves(rings[at(each.ring) - 1].body))
+          report.add(spring.place, fmt::format("cable \"{}\": capstan.radius", spring.name),
+                     fmt::format("{}", each.radius),
+                     "is of a pulley that turns, and the body of its ring is fixed");
+    }
   }
   void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     add_count(lines, "capstan friction", count_if(scene.springs, rubs), "cable");
@@ -90,6 +99,37 @@ struct CapstanEffect : Effect {
   }
 
  private:
+  // One table, or an array of them, in any order.
+  static void read(Fields& in, Reader& reader, Cable& cable) {
+    const Value* value = in.find(kKey);
+    if (value == nullptr) return;
+    const bool several = value->kind() != Value::Kind::table;
+    for (const Value* table : several ? in.tables(kKey) : std::vector<const Value*>{value}) {
+      const std::string path = in.field(kKey);
+      const std::size_t number = cable.capstans.size() + 1;
+      Fields fields = reader.fields(table, several ? fmt::format("{} {}", path, number) : path);
+      one(Form(fields, reader), cable, cable.capstans.emplace_back());
+      fields.finish();
+    }
+    std::sort(cable.capstans.begin(), cable.capstans.end(), before);
+    for (std::size_t k = 1; k < cable.capstans.size(); ++k)
+      if (!before(cable.capstans[k - 1], cable.capstans[k]))
+        return in.wrong(kKey, fmt::format("ring {} is there twice", cable.capstans[k].ring));
+  }
+  static bool before(const Capstan& a, const Capstan& b) { return a.ring < b.ring; }
+  static void one(const Form& form, const Cable& cable, Capstan& capstan) {
+    const int rings = static_cast<int>(cable.rings.size());
+    Fields* const in = form.in();
+    form.count("ring", capstan.ring, 1, std::max(rings, 1));
+    if (in && rings == 0) in->wrong("ring", "the cable has no ring between its ends to rub at");
+    if (in && rings > 1) form.require("ring", "which of its rings, from 1 on");
+    form.require("friction", "a coefficient");
+    coefficient(form, "friction", capstan.friction, {});
+    wrap(form, capstan.wrap);
+    form.number("radius", capstan.radius, kNotNegative, kMetres);
+    if (in ? in->has("axis") : capstan.radius > 0) form.direction("axis", capstan.axis);
+    if (in && capstan.radius > 0) form.require("axis", "of the pulley, world axes at t = 0");
+  }
   static void wrap(const Form& form, std::optional<double>& wrap) {
     Fields* const in = form.in();
     if (in && !in->has("wrap_deg") && !in->has("wrap_rad")) return;

@@ -4,7 +4,8 @@
 //
 // With static_friction a contact without slip holds where static_friction * normal impulse can hold
 // it. One that slips has the smaller coefficient until its slip ends, and impacts have it, too.
-// Both laws take energy only.
+// Both laws take energy only. With friction_across the ellipse of contacts that hold is that of
+// contacts that slip, times static_friction / friction.
 #include "mechanics/effect.hpp"
 #include "numbers.hpp"
 
@@ -14,14 +15,16 @@ struct FrictionEffect : Effect {
   void pair_fields(const Form& form, Pair& pair) const override {
     if (form.in() || pair.touch) coefficient(form, "friction", pair.friction, {});
     constexpr const char* kKey = "static_friction";
-    coefficient(form, kKey, pair.static_friction);
     Fields* const in = form.in();
-    if (!in || !pair.static_friction) return;
+    if (in && in->has(kKey)) pair.static_friction = pair.friction;  // stands for what is wrong
+    if (!pair.static_friction) return;
+    coefficient(form, kKey, *pair.static_friction, {});
+    if (!in) return;
     if (!pair.touch) in->wrong(kKey, "is of a contact, and touch = false has none");
     if (*pair.static_friction < pair.friction)
       in->wrong(kKey, fmt::format("must be at least friction, {}", pair.friction));
-    if (in->has("friction_across"))
-      in->wrong(kKey, "is of friction that is the same in all directions: without friction_across");
+    if (pair.friction == 0 && in->has("friction_across"))
+      in->wrong(kKey, "scales friction and friction_across: with the latter, friction must be > 0");
   }
   void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     const contact::Law law = scene.stepping.value_or(SteppingOptions{}).law;

@@ -217,6 +217,8 @@ class JointLaws {
   JointLaws(const Scene& scene, const Bodies& bodies);
 
   bool any() const { return !joints_.empty() || !slips_.empty(); }
+  /// Whether add() needs velocities, and not positions only.
+  bool sees_velocities() const;
   const std::vector<effects::CapstanSlip>& slips() const { return slips_; }
   /// In the order of add(), after which these can be asked for.
   int count() const { return static_cast<int>(placed_.size()); }
@@ -245,6 +247,13 @@ class JointLaws {
     }
   }
   void add(const Bodies& bodies, contact::JointLaws& out);
+  /// The grips of all slips(), in their order.
+  void grip(const Bodies& bodies, std::vector<effects::Grip>& out) const;
+  /// Whether the bound of a law depends on the forces of others (effects::share_tensions).
+  bool shares_tension(int law) const;
+  /// Puts the bounds that the impulses leave into the laws of the last add(); true: they changed.
+  bool change_bounds(const std::vector<double>& impulses, double dt,
+                     contact::JointLaws& laws) const;
   /// Adds what the impulses (of the last add()) over dt do to their joints; springs are Forces and
   /// tell theirs.
   void add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
@@ -266,11 +275,13 @@ class JointLaws {
   };
   void place(int item, double sign, const Bodies& bodies, contact::JointLaws& out);
   double value(const Item& item, const Bodies& bodies) const;
-  double turn(std::size_t component, const Bodies& bodies) const;  // of a ball
+  void measure_ball(std::size_t component, const Bodies& bodies,
+                    mechanics::JointLawList& out) const;
   const Item& item(int law) const { return joints_[at(placed_[at(law)].item)]; }
 
   std::vector<Item> joints_;                 // a ball is three
   std::vector<effects::CapstanSlip> slips_;  // behind them
+  std::vector<effects::Grip> grips_;         // of these, at the last add()
   std::vector<Placed> placed_;               // by law
 };
 

@@ -81,8 +81,9 @@ JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
       throw std::invalid_argument(name + "it is at 0 at t = 0, which must be between its limits");
   }
   for (std::size_t i = 0; i < scene.springs.size(); ++i)
-    if (scene.springs[i].cable && scene.springs[i].cable->capstan)
-      slips_.emplace_back(scene.springs[i], i, bodies);
+    if (const auto& cable = scene.springs[i].cable)
+      for (const Capstan& each : cable->capstans)
+        slips_.emplace_back(scene.springs[i], i, each, bodies);
 }
 
 // The turn of a hinge whose angle is nearest to the middle between its limits.
@@ -94,14 +95,24 @@ double JointLaws::value(const Item& item, const Bodies& bodies) const {
   return value + turn * std::round((middle - value) / turn);
 }
 
+bool JointLaws::sees_velocities() const {
+  return !slips_.empty() || any_of(joints_, [](const Item& item) {
+    return item.coordinate.is_component() && !item.law.spring->damping_table.empty();
+  });
+}
+
 // Its components stand one after the other.
-double JointLaws::turn(std::size_t component, const Bodies& bodies) const {
+void JointLaws::measure_ball(std::size_t component, const Bodies& bodies,
+                             mechanics::JointLawList& out) const {
   const int ball = joints_[component].joint;
   while (component > 0 && joints_[component - 1].joint == ball) --component;
-  double square = 0;
-  for (; component < joints_.size() && joints_[component].joint == ball; ++component)
-    square += std::pow(joints_[component].coordinate.value(bodies), 2);
-  return std::sqrt(square);
+  out.turn_squared = out.spin_squared = 0;
+  for (; component < joints_.size() && joints_[component].joint == ball; ++component) {
+    const Item& item = joints_[component];
+    out.turn_squared += std::pow(item.coordinate.value(bodies), 2);
+    if (!item.law.spring->damping_table.empty())
+      out.spin_squared += std::pow(item.coordinate.rate(bodies), 2);
+  }
 }
 
 void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
@@ -111,14 +122,49 @@ void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
     const Item& item = joints_[k];
     const double at_now = value(item, bodies);
     list.on = [&](double sign) { place(static_cast<int>(k), sign, bodies, out); };
-    if (item.law.spring && item.coordinate.is_component()) list.turn = turn(k, bodies);
+    if (item.law.spring && item.coordinate.is_component()) measure_ball(k, bodies, list);
     for (const effects::Effect* each : effects::all())
       each->add_laws(item.law, item.joint, at_now, list);
   }
+  grip(bodies, grips_);
   for (std::size_t k = 0; k < slips_.size(); ++k) {
-    out.add_bounded(-1, slips_[k].wanted(), slips_[k].bound(bodies));
+    out.add_bounded(-1, slips_[k].wanted(), grips_[k].bound());
     place(static_cast<int>(joints_.size() + k), 1, bodies, out);
   }
+}
+
+void JointLaws::grip(const Bodies& bodies, std::vector<effects::Grip>& out) const {
+  out.clear();
+  for (const effects::CapstanSlip& each : slips_) out.push_back(each.grip(bodies));
+}
+
+bool JointLaws::shares_tension(int law) const {
+  const effects::CapstanSlip* of = slip(law);
+  const auto same = [&](const effects::CapstanSlip& each) {
+    return &each != of && each.cable() == of->cable();
+  };
+  return of != nullptr && any_of(slips_, same);
+}
+
+bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
+                              contact::JointLaws& laws) const {
+  constexpr double kSettled = 1e-9, kAtBound = 1 - 1e-9;
+  const int first = count() - static_cast<int>(slips_.size());
+  double change = 0, largest = 0;
+  const auto force = [&](std::size_t ring) {
+    const double x = impulses[at(first) + ring] / dt;
+    const double bound = laws[first + static_cast<int>(ring)].bound;
+    const bool holds = x == 0 || std::abs(x) < kAtBound * bound;
+    return holds ? std::pair(x, 0.0) : std::pair(0.0, x > 0 ? 1.0 : -1.0);
+  };
+  effects::share_tensions(grips_, 1, force, [&](std::size_t ring, double bound) {
+    const int law = first + static_cast<int>(ring);
+    bound = std::max(0.0, bound);
+    change = std::max(change, std::abs(bound - laws[law].bound));
+    largest = std::max(largest, bound);
+    laws.set_bound(law, bound);
+  });
+  return change > kSettled * largest;
 }
 
 // One law after the other: a term goes to the law added last.

@@ -17,7 +17,8 @@ struct JointLawList {
   contact::JointLaws& laws;
   double time;                          ///< s
   std::function<void(double sign)> on;  ///< puts the law added last on the bodies of the joint
-  double turn = 0;                      ///< of a ball with a table since t = 0, rad
+  /// The squares of the turn of a ball with tables since t = 0 and of its speed, rad^2, rad^2/s^2.
+  double turn_squared = 0, spin_squared = 0;
 
   void limit(int joint, double gap, double restitution, double sign) {
     laws.add_limit(joint, gap, restitution);

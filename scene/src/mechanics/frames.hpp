@@ -28,6 +28,9 @@ constexpr int kPairDirections = 2 * kBodyDirections;
 using Derivatives = Eigen::Matrix<double, kPairDirections, 1>;
 using Dual = Eigen::AutoDiffScalar<Derivatives>;
 
+inline double value_of(double x) { return x; }
+inline double value_of(const Dual& x) { return x.value(); }
+
 // Plain loops of three: Eigen's products of AutoDiffScalars keep references to temporaries.
 template <class S>
 Vector3<S> cross(const Vector3<S>& a, const Vector3<S>& b) {

@@ -378,7 +378,7 @@ RunResult run(const Scene& scene, const RunOptions& options) {
         fmt::format("certificates do not know {} has: run it without --certificate", law + owner));
   };
   for (const Spring& each : scene.springs)
-    if (each.cable && each.cable->capstan)
+    if (each.cable && !each.cable->capstans.empty())
       refuse("capstan friction, which cable \"", each.name + "\"");
   for (const Pair& each : scene.pairs)
     if (each.static_friction)

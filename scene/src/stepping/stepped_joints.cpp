@@ -14,10 +14,10 @@ SteppedJoints::SteppedJoints(const Scene& scene)
 
 void SteppedJoints::add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) {
   bodies_.set_time(t, 0);
-  if (laws_.slips().empty())
-    bodies_.read_positions(bodies);
-  else
+  if (laws_.sees_velocities())
     bodies_.copy_motions(bodies);
+  else
+    bodies_.read_positions(bodies);
   laws_.add(bodies_.bodies(), out);
 }
 

@@ -37,6 +37,10 @@ class SteppedJoints final : public contact::JointEquations {
   }
   bool has_laws() const override { return laws_.any(); }
   void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;
+  bool change_bounds(const std::vector<double>& impulses, double dt,
+                     contact::JointLaws& laws) override {
+    return laws_.change_bounds(impulses, dt, laws);
+  }
   std::string name(int joint) const override {
     return mechanics::at(joint) < rows_.joint_count() ? "joint \"" + rows_.name(joint) + "\""
                                                       : "a cable";

@@ -25,6 +25,12 @@ class JointEquations {
   virtual bool has_laws() const { return false; }
   /// Adds the laws of the step that starts at t with these positions, always as many.
   virtual void add_laws(const BodySet& /*bodies*/, double /*t*/, JointLaws&) {}
+  /// Bounds of the laws that were added last may depend on the impulses of others. `impulses`, by
+  /// law, over dt: those that a solve has found. True: bounds are others now, so that the problem
+  /// is solved again.
+  virtual bool change_bounds(const std::vector<double>& /*impulses*/, double /*dt*/, JointLaws&) {
+    return false;
+  }
   /// Name, for messages, of the joint with that number in add_rows().
   virtual std::string name(int joint) const { return "joint " + std::to_string(joint); }
 };

@@ -45,6 +45,8 @@ class JointLaws {
   /// stiffness, damping >= 0, not both 0; bound >= 0, may be infinite.
   void add_sprung(int joint, double stretch, double stiffness, double damping, double rate,
                   double bound);
+  /// Replaces the bound of a bounded law by another one, >= 0.
+  void set_bound(int law, double bound);
   /// Adds the term G v of one more body to the law added last; body -1, the world, is ignored.
   void on(int body, const Vector6d& G);
 

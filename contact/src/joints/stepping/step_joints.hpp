@@ -40,6 +40,9 @@ class StepJoints final : public JointPart {
 
   bool has_laws() const override { return equations_->has_laws(); }
   void set_active(bool active) override { laws_.active = active; }
+  bool change_bounds(double dt) override {
+    return laws_.any(LawUse::all) && equations_->change_bounds(laws_.impulses, dt, laws_.laws);
+  }
   std::vector<double>& law_impulses() override { return laws_.impulses; }
   void add_bounded(bool plastic, const BodySet& bodies,
                    std::vector<RigidBody>& change) const override;

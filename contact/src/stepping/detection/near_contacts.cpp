@@ -40,9 +40,11 @@ void check(const Meeting& m) {
   if (!(m.friction_across.value_or(0) >= 0) || !std::isfinite(m.friction_across.value_or(0)))
     throw std::invalid_argument("meeting: friction_across must be >= 0 and finite");
   if (m.static_friction &&
-      !(*m.static_friction >= m.friction && std::isfinite(*m.static_friction) && !m.is_elliptic()))
+      !(*m.static_friction >= m.friction && std::isfinite(*m.static_friction) &&
+        (m.friction > 0 || !m.is_elliptic())))
     throw std::invalid_argument(
-        "meeting: static_friction must be finite and at least friction, without friction_across");
+        "meeting: static_friction must be finite and at least friction, which must be > 0 with "
+        "friction_across");
   if (m.is_elliptic() && m.first == m.second)
     throw std::invalid_argument(
         "meeting: friction_across is of two materials: the first one has the axis");
@@ -67,6 +69,8 @@ NearContacts::NearContacts(const BodySet& bodies, std::vector<Surface> surfaces,
     check(m);
     meetings_[std::minmax({m.first, m.second})] = m;  // the last one of a pair counts
   }
+  for (const auto& [materials, m] : meetings_)
+    static_meetings_ += has_friction_ && m.static_friction.has_value();
   if (surfaces_.size() >= (1u << 24))
     throw std::invalid_argument("more than 16777215 surfaces");  // contact_id has 24 bits
   for (std::size_t k = 0; k < surfaces_.size(); ++k) add_surface(static_cast<int>(k), bodies);

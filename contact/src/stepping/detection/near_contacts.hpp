@@ -56,9 +56,8 @@ class NearContacts {
   }
   bool any_rolling() const { return any(std::mem_fn(&Meeting::rolls)); }
   bool any_elliptic() const { return has_friction_ && any(std::mem_fn(&Meeting::is_elliptic)); }
-  bool any_static() const {
-    return has_friction_ && any([](const Meeting& m) { return m.static_friction.has_value(); });
-  }
+  /// Asked for in every sub-step.
+  bool any_static() const { return static_meetings_ > 0; }
   /// Two tangents at right angles of a contact with elliptic friction, after find(): each as long
   /// as its coefficient over the larger one, which is PointContact::mu.
   std::array<Eigen::Vector3d, 2> scaled_tangents(const PointContact& c) const;
@@ -81,6 +80,7 @@ class NearContacts {
   std::vector<Surface> surfaces_;
   std::map<std::pair<int, int>, Meeting> meetings_;  // by materials, the lower one first
   const bool has_friction_;
+  int static_meetings_ = 0;  // with friction
   double near_part_;
   PolyhedraContacts polyhedra_;
   Parts parts_;

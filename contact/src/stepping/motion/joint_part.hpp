@@ -98,6 +98,9 @@ class JointPart : public IslandMaker {
   virtual void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
                            const StepContacts& contacts) = 0;
 
+  /// Changes the bounds of laws that depend on the impulses of the last problem of velocities, over
+  /// dt. False: they are as they were.
+  virtual bool change_bounds(double dt) = 0;
   /// Impulses of the laws in the last sub-step.
   virtual std::vector<double>& law_impulses() = 0;
   /// Velocities that motors and friction of joints have added in the last problem of velocities,

@@ -102,8 +102,8 @@ struct Ring {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< world coordinates at t = 0, m
 };
 
-/// Friction of a cable at one of its rings: the tensions before and behind it differ by a factor of
-/// at most e^(friction wrap).
+/// Friction of a cable at a ring of its: the tensions before and behind it differ by a factor of at
+/// most e^(friction wrap).
 struct Capstan {
   int ring = 1;                ///< which of Cable::rings, from 1 on
   double friction = 0;         ///< coefficient
@@ -117,8 +117,8 @@ struct Capstan {
 /// A spring that does not push, through rings.
 struct Cable {
   std::vector<Ring> rings;  ///< from the first end to the second
-  double winch = 0;         ///< the rest grows by it, m/s; where it rubs, before the ring
-  std::optional<Capstan> capstan = {};  ///< absent: it rubs nowhere
+  double winch = 0;         ///< the rest grows by it, m/s; where it rubs, before the first ring
+  std::vector<Capstan> capstans = {};  ///< ring by ring; empty: it rubs nowhere
 };
 
 /// Force stiffness (|d| - rest) + damping d|d|/dt along d between two points. A cable has the sum

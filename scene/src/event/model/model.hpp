@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "bounds.hpp"
 
@@ -41,6 +42,11 @@ struct ContactLaw {
   bool is_line() const { return is_bounded() || spin; }  ///< it has one tangent only
 };
 
+/// The force of a bounded law that sticks, or the sign of that of one that slides; else 0.
+struct LawForce {
+  double held = 0, slides = 0;
+};
+
 /// q' = N(q) u, M(q) u' = h(t, q, u) + joints + contacts. Everything is asked of the state that was
 /// set last. One call treats the whole system.
 class Model {
@@ -58,6 +64,12 @@ class Model {
   virtual ContactLaw law(int contact) const = 0;
   /// The coefficient of friction without slip: that of the law, or a larger one.
   virtual double holding(int contact) const { return law(contact).friction; }
+  /// Whether the bound of a law depends on the forces of others, which also have such bounds.
+  virtual bool shares_bound(int /*contact*/) const { return false; }
+  /// The bounds of those, by contact, which are affine in the forces that are held. `loaded`: 1; 0:
+  /// the part of these forces.
+  virtual void share_bounds(double /*loaded*/, const std::vector<LawForce>& /*forces*/,
+                            std::vector<double>& /*bounds*/) const {}
   /// Sizes of coordinates, velocities and energy: tolerances are relative to them where values are
   /// smaller. 1 in units in which these are near 1.
   virtual VectorXd sizes() const { return VectorXd::Ones(coordinates() + velocities() + 1); }

@@ -154,10 +154,24 @@ void SceneModel::find_holding(const Scene& scene) {
                         &b = scene.bodies[at(pairs_[k].second)].material;
       holding_.resize(pairs_.size(), -1);
       if (std::minmax(a, b) == std::minmax(from.first, from.second))
-        holding_[k] = *from.static_friction;
+        holding_[k] = pairs_[k].elliptic
+                          ? *from.static_friction / from.friction * pairs_[k].friction
+                          : *from.static_friction;
     }
   for (std::size_t k = 0; k < holding_.size(); ++k)
     holding_[k] = std::max(holding_[k], pairs_[k].friction);
+}
+
+// The slips of cables are the last laws.
+void SceneModel::share_bounds(double loaded, const std::vector<LawForce>& forces,
+                              std::vector<double>& bounds) const {
+  std::vector<effects::Grip> rings;
+  joint_laws().grip(bodies_.all(), rings);
+  const std::size_t first = at(first_moment()) - rings.size();
+  bounds.resize(forces.size());
+  effects::share_tensions(
+      rings, loaded, [&](std::size_t ring) { return forces[first + ring]; },
+      [&](std::size_t ring, double bound) { bounds[first + ring] = bound; });
 }
 
 std::string SceneModel::contact_name(int contact) const {

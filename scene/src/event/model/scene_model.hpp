@@ -28,7 +28,7 @@ class LawContacts {
   /// Cables rub by their tension.
   ContactLaw law(int k, const mechanics::Bodies& bodies) const {
     ContactLaw of = at_place(k).of;
-    if (const auto* slip = laws_.slip(place(k))) of.bound = slip->bound(bodies);
+    if (const auto* slip = laws_.slip(place(k))) of.bound = slip->grip(bodies).bound();
     return of;
   }
   double gap(int k, const mechanics::Bodies& bodies, double& rate) const;
@@ -79,6 +79,12 @@ class SceneModel final : public Model {
   double holding(int contact) const override {
     return holding_.empty() || !is_pair(contact) ? law(contact).friction : holding_[at(contact)];
   }
+
+  bool shares_bound(int contact) const override {
+    return is_law(contact) && joint_laws().shares_tension(joint_law(contact));
+  }
+  void share_bounds(double loaded, const std::vector<LawForce>& forces,
+                    std::vector<double>& bounds) const override;
 
   void set(double t, const double* q, const double* u) override;
   double next_kink(double t) const override;

@@ -18,6 +18,8 @@ namespace {
 constexpr double kLocked = 1e-12;  // A_nn of the largest
 constexpr double kSolve = 1e-12, kNear = 1e-8;
 constexpr double kFarAbove = 1e5;
+constexpr int kMostRounds = 100;         // of bounds that follow forces, which contract
+constexpr double kSettledBound = 1e-13;  // of the largest
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
 
 /// The cones of a problem, and their rows in it. Those without a bound, and those of contacts that
@@ -224,10 +226,8 @@ FrictionSolution solve_shared(FrictionProblem& problem, const std::vector<Vector
   return out;
 }
 
-}  // namespace
-
-AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
-                                         double part, const std::vector<bool>& closed) {
+AccelerationSolution solve_with_bounds(ContactRows& rows, const std::vector<VectorXd>& slides,
+                                       double part, const std::vector<bool>& closed) {
   FrictionProblem problem = rows.problem(-rows.free_accelerations());
   std::vector<VectorXd> turning = slides;
   VectorXd known = VectorXd::Zero(problem.b.size());
@@ -254,6 +254,17 @@ AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<Ve
   for (std::size_t k = 0; k < slides.size(); ++k)
     if (turning[k].size() < slides[k].size()) out.contacts.regimes[k] = Regime::sliding;
   return out;
+}
+
+}  // namespace
+
+AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<VectorXd>& slides,
+                                         double part, const std::vector<bool>& closed) {
+  for (int round = 0;; ++round) {
+    AccelerationSolution out = solve_with_bounds(rows, slides, part, closed);
+    if (!out.contacts.solved || round == kMostRounds || !rows.share_bounds(out.contacts, slides))
+      return out;
+  }
 }
 
 FrictionSolution solve_impact(FrictionProblem problem, double band) {
@@ -335,6 +346,34 @@ VectorXd ContactRows::of(int k, const VectorXd& values) const {
   if (p.has_normal()) out[0] = values[p.first];
   out.segment(1, p.slips) = p.slip_of(values);
   return out;
+}
+
+bool ContactRows::share_bounds(const FrictionSolution& answer,
+                               const std::vector<VectorXd>& slides) {
+  std::vector<std::size_t> sharing;
+  for (std::size_t k = 0; k < contacts_.size(); ++k)
+    if (model_.shares_bound(contacts_[k])) sharing.push_back(k);
+  if (sharing.empty()) return false;
+  std::vector<LawForce> forces(at(model_.contacts()));
+  for (const std::size_t k : sharing) {
+    const double x = answer.x[parts_[k].first];
+    LawForce& force = forces[at(contacts_[k])];
+    if (slides[k].size() > 0)
+      force.slides = -slides[k][0];
+    else if (answer.regimes[k] == Regime::sliding && x != 0)
+      force.slides = x > 0 ? 1 : -1;
+    else
+      force.held = x;
+  }
+  std::vector<double> bounds;
+  model_.share_bounds(1, forces, bounds);
+  double change = 0, largest = 0;
+  for (const std::size_t k : sharing) {
+    const double bound = std::max(0.0, bounds[at(contacts_[k])]);
+    change = std::max(change, std::abs(bound - std::exchange(parts_[k].bound, bound)));
+    largest = std::max(largest, bound);
+  }
+  return change > kSettledBound * largest;
 }
 
 // Bounded laws and moments about axes that joints hold do nothing: what is left of their mobility

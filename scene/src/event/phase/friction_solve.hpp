@@ -69,6 +69,9 @@ class ContactRows {
   /// Accelerations by row without forces in them, and those of the model.
   VectorXd free_accelerations();
   VectorXd change(const VectorXd& x) const { return PL_ * x; }
+  /// Gives parts that share their bounds those that the forces x of an answer leave. True: they
+  /// are others now.
+  bool share_bounds(const FrictionSolution& answer, const std::vector<VectorXd>& slides);
 
  private:
   void take_rows();

@@ -189,6 +189,9 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
     row_of_[k] = rows_;
     rows_ += normals_of(k) + tangents_of(k);
   }
+  sharing_.clear();
+  for (std::size_t k = 0; k < closed_.size(); ++k)
+    if (model_.shares_bound(closed_[k])) sharing_.push_back(k);
   works_ = model_.does_work();
   for (std::size_t k = 0; k < closed_.size(); ++k)
     works_ =
@@ -339,12 +342,44 @@ int Motion::choose_rows() {
   return independent.rank();
 }
 
+double Motion::bound(std::size_t closed) const {
+  const int contact = closed_[closed];
+  return contains(sharing_, closed) ? bounds_[index(contact)] : model_.law(contact).bound;
+}
+
+// Laws that slide get their bounds without the forces of those that stick, whose columns have the
+// rest.
+void Motion::share_bounds() {
+  shared_.assign(index(model_.contacts()), {});
+  const auto force_of = [&](std::size_t k) -> LawForce& { return shared_[index(closed_[k])]; };
+  for (const std::size_t k : sharing_)
+    if (!sticks(k)) force_of(k).slides = -modes_[index(closed_[k])].direction[0];
+  model_.share_bounds(1, shared_, bounds_);
+  for (const std::size_t k : sharing_) {
+    if (!sticks(k)) continue;
+    force_of(k).held = 1;
+    model_.share_bounds(0, shared_, bounds_moved_);
+    force_of(k).held = 0;
+    for (const std::size_t j : sharing_)
+      C_.col(row_of_[k]) += force_of(j).slides * bounds_moved_[index(closed_[j])] *
+                            kinematics_[j].tangents.row(0).transpose();
+  }
+}
+
+// With all forces.
+void Motion::find_bounds() {
+  for (const std::size_t k : sharing_)
+    if (sticks(k)) shared_[index(closed_[k])].held = lambda_[row_of_[k]];
+  model_.share_bounds(1, shared_, bounds_);
+}
+
 // Accelerations without the forces of rows, and the columns of these.
 void Motion::prepare(double t, const double* y) {
   set(t, y);
   gather();
   work_done_ += kGatherWork * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
   model_.forces(h_);
+  if (!sharing_.empty()) share_bounds();
   for (std::size_t k = 0; k < closed_.size(); ++k)
     if (is_bounded(k) && !sticks(k))
       h_ += kinematics_[k].tangents.transpose() * friction_force(static_cast<int>(k));
@@ -366,6 +401,7 @@ void Motion::rate(double t, const double* y, double* y_rate) {
     a_.noalias() += MC_ * scaled;
     lambda_ = row_scale_.cwiseProduct(scaled);
   }
+  if (!sharing_.empty()) find_bounds();
   finish_rate(y_rate);
 }
 
@@ -456,7 +492,7 @@ VectorXd Motion::friction_force(int closed) const {
     force.head(n) = lambda_.segment(row + normals_of(k), n);
     return force;
   }
-  if (law.is_bounded()) return -law.bound * modes_[index(closed_[k])].direction;
+  if (law.is_bounded()) return -bound(k) * modes_[index(closed_[k])].direction;
   const double mu = law.friction;
   if (mu == 0) return VectorXd::Zero(tangents_);
   const VectorXd s = held_slip(closed);

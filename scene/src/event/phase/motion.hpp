@@ -89,8 +89,7 @@ class Motion {
   void rate(double t, const double* y, double* y_rate);
   const VectorXd& acceleration() const { return a_; }
   double normal_force(int closed) const {  ///< of a bounded law: its bound
-    const ContactLaw law = model_.law(closed_[index(closed)]);
-    return law.is_bounded() ? law.bound : lambda_[normal_row(index(closed))];
+    return is_bounded(index(closed)) ? bound(index(closed)) : lambda_[normal_row(index(closed))];
   }
   VectorXd friction_force(int closed) const;  ///< by tangents
   /// Forces of all rows of joints: redundant ones share.
@@ -144,6 +143,9 @@ class Motion {
   }
   /// Its own, or that which holds it.
   int normal_row(std::size_t closed) const { return row_of_[holder_[closed]]; }
+  double bound(std::size_t closed) const;
+  void share_bounds();
+  void find_bounds();
   void set(double t, const double* y);
   void find_holders();
   void prepare(double t, const double* y);
@@ -177,6 +179,9 @@ class Motion {
   VectorXd joint_g_, joint_rate_, joint_rest_, row_scale_;
   MatrixXd joint_W_, R_, C_, MC_;
   RowIslands islands_;
+  std::vector<std::size_t> sharing_;           // closed laws that share their bounds
+  std::vector<LawForce> shared_;               // by contact
+  std::vector<double> bounds_, bounds_moved_;  // by contact: of these
   double work_done_ = 0;
   double smallest_slip_ = 0;
 };

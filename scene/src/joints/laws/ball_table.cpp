@@ -1,8 +1,11 @@
-// Tether: tabulated springs of ball joints. SPDX-License-Identifier: BSD-3-Clause
+// Tether: tabulated springs and dampers of ball joints. SPDX-License-Identifier: BSD-3-Clause
 //
-// With the turn p of the first body against the second since t = 0, in world axes: the moment
-// -f(|p|) p / |p|, the potential of f up to |p|. Steps take the stiffness f(|p|) / |p| of their
-// start with the turn of their end.
+// With the turn p of the first body against the second since t = 0 and its angular velocity w
+// against it, in world axes: the moment
+//
+//   -f(|p|) p / |p| - c(|w|) w / |w|,   the potential of f up to |p|,   power -c(|w|) |w|
+//
+// Steps take f(|p|) / |p| and c(|w|) / |w| of their start with the turn and the speed of their end.
 #include "bounds.hpp"
 #include "joints/coordinate.hpp"
 #include "joints/laws/joint_law_effect.hpp"
@@ -13,19 +16,21 @@ namespace tether::scene::effects {
 namespace {
 
 bool has_table(const Joint& joint) {
-  return joint.spring && !joint.spring->stiffness_table.empty() &&
+  return joint.spring &&
+         !(joint.spring->stiffness_table.empty() && joint.spring->damping_table.empty()) &&
          joints::type(joint.kind).turns_freely();
 }
+bool has_damping(const Joint& joint) {
+  return has_table(joint) && !joint.spring->damping_table.empty();
+}
 
-double number(double x) { return x; }
-double number(const Dual& x) { return x.value(); }
-
-/// The moment over the turn, of which this is the square.
+/// The moment over the turn or speed, of which this is the square; without a table none.
 template <class S>
 S softened(const ForceTable& table, const S& square) {
   using std::sqrt;
+  if (table.empty()) return S(0.0);
   const auto to = std::find_if(table.begin(), table.end(), [&square](const auto& row) {
-    return number(square) < row[0] * row[0];
+    return value_of(square) < row[0] * row[0];
   });
   if (to == table.end()) return S(table.back()[1] / sqrt(square));
   if (to == table.begin()) return S((*to)[1] / (*to)[0]);
@@ -34,42 +39,49 @@ S softened(const ForceTable& table, const S& square) {
   return S(k + ((*from)[1] - k * (*from)[0]) / sqrt(square));
 }
 
-/// The table of one ball.
+/// The tables of one ball.
 struct BallTable {
   int first, second;
   std::size_t joint;
   std::vector<joints::Coordinate> turn;  // its components
-  ForceTable table;
+  ForceTable stiffness, damping;
 
   template <class S>
-  Vector3<S> moment(const Frame<S>& A, const Frame<S>& B) const {
+  Vector3<S> moment(const Frame<S>& A, const Frame<S>& B, bool with_damping) const {
     Vector3<S> p;
     for (int k = 0; k < 3; ++k) p[k] = turn[at(k)].value(A, B);
-    const S factor = softened(table, dot(p, p));
+    const S factor = softened(stiffness, dot(p, p));
     for (int k = 0; k < 3; ++k) p[k] *= S(-factor);
+    if (!with_damping || damping.empty()) return p;
+    const Vector3<S> w = A.W - B.W;
+    const S slows = softened(damping, dot(w, w));
+    for (int k = 0; k < 3; ++k) p[k] -= slows * w[k];
     return p;
   }
   template <class S>
-  void pull(double, const Frame<S>& A, const Frame<S>& B, bool, Wrench<S>& on_first,
+  void pull(double, const Frame<S>& A, const Frame<S>& B, bool all, Wrench<S>& on_first,
             Wrench<S>& on_second) const {
-    const Vector3<S> M = moment(A, B);
+    const Vector3<S> M = moment(A, B, all);
     on_first.torque += M;
     on_second.torque -= M;
   }
   double potential(double, const Frame<double>& A, const Frame<double>& B) const {
+    if (stiffness.empty()) return 0;
     double square = 0, sum = 0;
     for (const joints::Coordinate& each : turn) square += std::pow(each.value(A, B), 2);
     const double turned = std::sqrt(square);
-    each_piece(table, [&](const auto& from, const auto& to) {
+    each_piece(stiffness, [&](const auto& from, const auto& to) {
       const double way = std::min(turned, to[0]) - from[0];
       if (way > 0) sum += way * (from[1] + 0.5 * slope(from, to) * way);
     });
-    return sum + std::max(0.0, turned - table.back()[0]) * table.back()[1];
+    return sum + std::max(0.0, turned - stiffness.back()[0]) * stiffness.back()[1];
   }
-  bool works() const { return false; }
+  bool works() const { return !damping.empty(); }
   template <class S>
-  S power(double, const Frame<S>&, const Frame<S>&) const {
-    return S(0.0);
+  S power(double, const Frame<S>& A, const Frame<S>& B) const {
+    const Vector3<S> w = A.W - B.W;
+    const S square = dot(w, w);
+    return S(-softened(damping, square) * square);
   }
 };
 
@@ -79,7 +91,8 @@ struct BallTables : PairForces<BallTable> {
       if (!has_table(scene.joints[j])) continue;
       std::vector<joints::Coordinate> turn = joints::coordinates_of(scene.joints[j], j, bodies);
       const int first = turn[0].first(), second = turn[0].second();
-      push_back({first, second, j, std::move(turn), scene.joints[j].spring->stiffness_table});
+      const JointSpring& spring = *scene.joints[j].spring;
+      push_back({first, second, j, std::move(turn), spring.stiffness_table, spring.damping_table});
     }
   }
   const char* name() const override { return "joint springs"; }
@@ -88,7 +101,7 @@ struct BallTables : PairForces<BallTable> {
   void report(const Bodies& bodies, Forces& forces) const override {
     for (const BallTable& each : items()) {
       const auto frames = frame_pair(bodies, each);
-      forces.joints[each.joint].moment += each.moment(frames.first, frames.second);
+      forces.joints[each.joint].moment += each.moment(frames.first, frames.second, true);
     }
   }
 };
@@ -112,11 +125,13 @@ struct BallTableEffect : Effect {
           rate.take(std::sqrt(slope(from, to) / (mass * length * length)));
         });
   }
+  bool does_work(const Scene& scene) const override { return any_of(scene.joints, has_damping); }
   void add_laws(const Joint& joint, int number, double value, JointLawList& out) const override {
     if (!has_table(joint)) return;
-    const double stiffness = softened(joint.spring->stiffness_table, out.turn * out.turn);
-    if (stiffness > 0)
-      out.sprung(number, value, stiffness, 0, 0, kInfinity);
+    const double stiffness = softened(joint.spring->stiffness_table, out.turn_squared),
+                 damping = softened(joint.spring->damping_table, out.spin_squared);
+    if (stiffness > 0 || damping > 0)
+      out.sprung(number, value, stiffness, damping, 0, kInfinity);
     else
       out.bounded(number, 0, 0);  // always as many laws
   }

@@ -62,7 +62,7 @@ void each_part(const ForceTable& table, const F& f) {
 template <class F>
 void each_of(const JointSpring& spring, bool turns, const F& f) {
   if (spring.stiffness > 0 || spring.damping > 0) f(Gains(spring));
-  if (turns) return;  // the turn of a ball has a table as a whole
+  if (turns) return;  // the turn of a ball has tables as a whole
   each_part(spring.stiffness_table, [&](double slope, double middle, double bound) {
     Gains part;
     part.stiffness = slope;
@@ -93,8 +93,6 @@ void each_gains(const Scene& scene, const F& f) {
 }
 
 double nearest_turn(double angle) { return std::remainder(angle, 2 * linalg::kPi) - angle; }
-double number_of(double x) { return x; }
-double number_of(const Dual& x) { return x.value(); }
 
 /// Gains along one coordinate.
 struct Sprung : Gains {
@@ -114,7 +112,7 @@ struct Sprung : Gains {
   template <class S>
   S stretch(double t, const Frame<S>& A, const Frame<S>& B) const {
     S out = S(coordinate.value(A, B) - (rest + rate * t));
-    if (turns) out += nearest_turn(number_of(out));
+    if (turns) out += nearest_turn(value_of(out));
     out -= offset;
     return out;
   }
@@ -123,8 +121,8 @@ struct Sprung : Gains {
     S out(0.0);
     if (stiffness > 0) out -= stiffness * stretch(t, A, B);
     if (with_damping && damping > 0) out -= damping * (coordinate.rate(A, B) - rate);
-    if (number_of(out) > bound) return S(bound);
-    if (number_of(out) < -bound) return S(-bound);
+    if (value_of(out) > bound) return S(bound);
+    if (value_of(out) < -bound) return S(-bound);
     return out;
   }
 
@@ -184,15 +182,13 @@ bool is_table(const ForceTable& table) {
   return last[1] > 0;
 }
 
-void table_fields(const Form& form, const char* gain, const char* only, const Unit& number,
-                  const Unit& force, ForceTable& table) {
+void table_fields(const Form& form, const char* gain, const Unit& number, const Unit& force,
+                  ForceTable& table) {
   const std::string key = std::string(gain) + "_table";
   form.rows(key, table, kMostRows, number, force);
   Fields* in = form.in();
   if (!in || !in->has(key)) return;
-  if (only)
-    in->wrong(key, only);
-  else if (in->has(gain))
+  if (in->has(gain))
     in->wrong(key, fmt::format("give {} or {}, not both", gain, key));
   else if (!is_table(table))
     in->wrong(key, fmt::format("must be an array of up to {} [number above 0, force], numbers that "
@@ -211,10 +207,8 @@ struct JointSpringEffect : JointLawEffect {
     form.table("spring", joint.spring, [&](const Form& in, JointSpring& spring) {
       if (in.in() || spring.stiffness_table.empty()) stiffness(in, angle, spring.stiffness);
       if (in.in() || spring.damping_table.empty()) damping(in, angle, spring.damping);
-      table_fields(in, "stiffness", nullptr, angle ? Unit{} : kMetres, force,
-                   spring.stiffness_table);
-      table_fields(in, "damping", is_free ? nullptr : "is of hinges and sliders",
-                   angle ? kTurning : kSpeed, force, spring.damping_table);
+      table_fields(in, "stiffness", angle ? Unit{} : kMetres, force, spring.stiffness_table);
+      table_fields(in, "damping", angle ? kTurning : kSpeed, force, spring.damping_table);
       if (Fields* read = in.in(); read && !(spring.stiffness > 0 || spring.damping > 0) &&
                                   !read->has("stiffness_table") && !read->has("damping_table"))
         read->missing("stiffness", angle ? "give stiffness (N m/rad), damping (N m s/rad) or both"
