@@ -163,7 +163,7 @@ class Evaluator {
                  const std::function<void(int, int)>& found);
 
  private:
-  // Where C is wanted.
+  // A point, and the columns of C that differences visit there.
   struct At {
     double t;
     const double* y;

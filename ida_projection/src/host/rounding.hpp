@@ -1,4 +1,5 @@
-// Tether: sizes that count as none. SPDX-License-Identifier: BSD-3-Clause
+// Tether: rounding, and what differences and observations are worth. SPDX-License-Identifier:
+// BSD-3-Clause
 #pragma once
 
 #include <limits>
@@ -8,5 +9,18 @@ namespace tether::ida_projection {
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kRoundingOfTerms = 64.0 * kEpsilon;  ///< of a g, beside the sum of its terms
 constexpr double kNothing = 1e-8;                     ///< tolerances: a shorter move counts as none
+
+/// Increments of difference quotients, in parts of the size of what is changed: of first and second
+/// order, against cancellation at tight tolerances; of fourth order, where rounding over it and its
+/// fourth power both are 1e-12.
+constexpr double kIncrement = 1e-5, kWideIncrement = 1e-3;
+/// Parts of rows of difference quotients that say nothing: quotients are good to 1e-6, products of
+/// them lose another digit.
+constexpr double kQuotientRounding = 1e-6, kProductRounding = 10.0 * kQuotientRounding;
+
+/// What costs as much as the rest of an attempt is done in one of so many; what changes slowly is
+/// measured anew in one of so many.
+constexpr int kOneIn = 16;
+constexpr long kMeasureEvery = 64;
 
 }  // namespace tether::ida_projection

@@ -22,7 +22,6 @@ constexpr double kFollows = 0.25;  // of Options::tolerance: dropped rows may as
 constexpr int kFew = 16;           // rows: their moves are not rough
 constexpr int kEarly = 16;         // decisions about the rank in which rates are looked for
 constexpr double kAlike = 0.05;    // relative change of a sum of squares
-constexpr double kAlong = 1e-3;    // of y, for differences along s
 
 double square(double x) { return x * x; }
 
@@ -243,7 +242,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     std::fill(r.begin(), r.end(), 0.0);
     if (largest_s == 0.0) return Status::success;
     shifted_.resize(y_.size());
-    const double d = kAlong * (largest_y > 0.0 ? largest_y : 1.0) / largest_s;
+    const double d = kWideIncrement * (largest_y > 0.0 ? largest_y : 1.0) / largest_s;
     return central_differences(d, r, g_, [&](double e, std::vector<double>& g) {
       for (std::size_t j = 0; j < y_.size(); ++j) shifted_[j] = y_[j] + e * along[j];
       return evaluator_.value(t_, shifted_.data(), unknowns(), g.data());

@@ -147,7 +147,6 @@ class Newton : public RowsAt {
 
  private:
   static constexpr double kLargestFloor = 0.1;  // tolerances
-  static constexpr int kMostTests = 16;         // candidates tested with factors of an earlier one
   static constexpr int kUnneededMoves = 8;      // moves below kNothing in a row, then tests begin
 
   enum class Verdict { done, go_on, refactor, failed };
@@ -170,8 +169,7 @@ class Newton : public RowsAt {
     return status;
   }
   bool may_test() const {
-    return in_use(Mechanism::tests_before_moves) && age < kMostTests &&
-           factors == Factors::of_all_rows;
+    return in_use(Mechanism::tests_before_moves) && age < kOneIn && factors == Factors::of_all_rows;
   }
   // Whether C and the factors of an earlier candidate show that no move is needed. In a run whose
   // constraints IDA keeps by itself g is rounding in every step, and evaluating g alone suffices.

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <tether/linalg/least_squares.hpp>
 
+#include "host/rounding.hpp"
 #include "rows/split_rows.hpp"
 
 namespace tether::ida_projection {
@@ -17,8 +18,6 @@ namespace {
 
 using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kPresent = 1e-6;    // of a row's largest entry; smaller ones are rounding
-constexpr double kExplained = 1e-5;  // of a row, left by the equations that explain it
 constexpr double kRestricts = 1e-2;  // of a row: the candidate is off the set by its own error
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -49,7 +48,6 @@ class Differences {
 
   // Central differences: rows that nearly depend on each other magnify what one-sided ones leave.
   int entries(const double* y, double* values) {
-    constexpr double kIncrement = 1e-5;  // of the largest |y_j| so far
     std::copy(y, y + point_.size(), point_.begin());
     double largest = 0.0;
     for (double value : point_) largest = std::max(largest, std::abs(value));
@@ -117,7 +115,7 @@ std::vector<double> further_away(const std::vector<double>& y, const std::vector
   double largest = 0.0;
   for (double value : y) largest = std::max(largest, std::abs(value));
   std::vector<double> reach = WT;
-  for (double& length : reach) length = std::max(length, 1e-5 * largest);
+  for (double& length : reach) length = std::max(length, kIncrement * largest);
   return some_tolerances_away(y, reach);
 }
 
@@ -147,7 +145,7 @@ class Span {
 struct Point {
   std::vector<double> y;
   Dense C, h;
-  linalg::LeastSquares factors{kPresent};  // of h_a^T
+  linalg::LeastSquares factors{kQuotientRounding};  // of h_a^T
 
   bool evaluate_rows(Evaluator& rows, double t, const std::vector<double>& WT,
                      const std::vector<int>& free) {
@@ -180,11 +178,11 @@ struct Point {
     *x = factors.solve(part);
     const double largest = x->size() > 0 ? x->lpNorm<Eigen::Infinity>() : 0.0;
     for (double& share : *x)
-      if (std::abs(share) < kPresent * largest) share = 0.0;
+      if (std::abs(share) < kQuotientRounding * largest) share = 0.0;
     Eigen::VectorXd made = Eigen::VectorXd::Zero(part.size());
     for (Eigen::Index i = 0; i < x->size(); ++i)
       for (Eigen::Index k = 0; k < part.size(); ++k) made[k] += (*x)[i] * h(i, algebraic[at(k)]);
-    return (made - part).norm() <= kExplained * part.norm();
+    return (made - part).norm() <= kProductRounding * part.norm();
   }
 
  private:
@@ -198,7 +196,7 @@ struct Point {
       const double length = a->row(i).norm();
       if (length > 0.0) a->row(i) /= length;
       for (Eigen::Index j = 0; j < a->cols(); ++j)
-        if (std::abs((*a)(i, j)) < kPresent) (*a)(i, j) = 0.0;
+        if (std::abs((*a)(i, j)) < kQuotientRounding) (*a)(i, j) = 0.0;
     }
     return true;
   }
@@ -327,7 +325,7 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
     if (std::any_of(algebraic.begin(), algebraic.end(), [&](int j) { return contains(i, j); }))
       hanging.push_back(i);
     else
-      plain.add(here.C.row(i).transpose(), kPresent);
+      plain.add(here.C.row(i).transpose(), kQuotientRounding);
   }
   if (hanging.empty()) return found;
   const std::vector<char> is_equation = derivative_free();
@@ -348,11 +346,11 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
   for (int i = 0; i < m; ++i) {
     bool other = false;
     for (int j : algebraic) other = other || (follows(j) && contains(i, j));
-    if (!other) together.add(here.C.row(i).transpose(), kPresent);
+    if (!other) together.add(here.C.row(i).transpose(), kQuotientRounding);
   }
   for (std::size_t e = 0; e < used.size(); ++e) {
     const auto k = static_cast<Eigen::Index>(e);
-    if (!used[e] || !together.add(here.h.row(k).transpose(), kExplained)) continue;
+    if (!used[e] || !together.add(here.h.row(k).transpose(), kProductRounding)) continue;
     found.equations.push_back(equations[e]);
   }
   find_columns(residual, t, further_away(y, WT), &found);

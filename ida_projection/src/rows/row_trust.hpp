@@ -8,9 +8,9 @@
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
 
-namespace tether::ida_projection {
+#include "host/rounding.hpp"
 
-constexpr long kMeasureEvery = 64;  ///< candidates: how often curvatures are measured anew
+namespace tether::ida_projection {
 
 /// Rows that are dependent on the set { g = 0 } are independent at a distance d from it, by an
 /// angle kappa d; kappa is the rate at which the unit rows of C D turn with y (method, section 9).

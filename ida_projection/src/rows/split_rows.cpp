@@ -20,8 +20,6 @@ using linalg::at;
 
 namespace {
 
-constexpr long kFirstRefresh = 16;  // evaluations of C, then twice as many each time
-
 // Whether a row is solved for differential variables although it contains algebraic ones. This is
 // so if the algebraic part (in tolerances, squared) is negligible beside the rest: solving for it
 // would divide by nearly zero. `already`: it was so before.
@@ -222,9 +220,10 @@ SplitRows::SplitRows(const Constraints& constraints, Evaluator& evaluator, int n
       evaluator_(evaluator),
       m_(evaluator.rows()),
       n_(n),
-      rank_tolerance_(sparse || evaluator.uses_differences() ? 1e-6 : std::max(m_, n) * 1e-13),
+      rank_tolerance_(sparse || evaluator.uses_differences() ? kQuotientRounding
+                                                             : std::max(m_, n) * 1e-13),
       C_(evaluator, n, sparse),
-      next_refresh_(kFirstRefresh) {}
+      next_refresh_(kOneIn) {}
 
 // Entries not zero at y or at a point some tolerances away. Columns that differences do not visit
 // leave no entry in C.
@@ -351,7 +350,7 @@ void SplitRows::inspect(double t, const double* y, const double* WT) {
   }
   if (watched_.empty()) return;
   if (evaluator_.uses_differences() && ++evaluations_ >= next_refresh_) {
-    next_refresh_ = std::max(kFirstRefresh, 2 * evaluations_);
+    next_refresh_ = std::max<long>(kOneIn, 2 * evaluations_);
     evaluator_.sensitive(t, y, n_, WT, [this](int i, int j) { C_.notice(i, j); });
     outgrown_ |= C_.has_seen(watched_);
   }

@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/rounding.hpp"
 #include "host/shortest.hpp"
 #include "sensitivity/corrector.hpp"
 
 namespace tether::ida_projection {
 
 namespace {
-
-// A part of the parameter's scale: rounding of g over it, and its fourth power, both are 1e-12.
-constexpr double kIncrement = 1e-3;
 
 // A parameter of the host, put back whatever happens.
 struct Shifted {
@@ -125,7 +123,8 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
     return status;
   };
   const double speed = N_VMaxNorm(yp), size = N_VMaxNorm(y);
-  const double e = 1e-3 * (speed > 0.0 && size > 0.0 ? size / speed : std::max(1.0, std::abs(t)));
+  const double e =
+      kWideIncrement * (speed > 0.0 && size > 0.0 ? size / speed : std::max(1.0, std::abs(t)));
   std::vector<OwnedVector> moved, moved_p;
   const auto fail = [&](Status status) {
     report.status = status;
@@ -199,7 +198,7 @@ Status SensitivityCorrector::differences(int parameter, double t, N_Vector y,
   const Shifted p{given_.parameters + (given_.list.empty() ? parameter : given_.list[k])};
   const double size = std::abs(given_.scales.empty() ? p.value : given_.scales[k]);
   // A power of two: p + d - p is d.
-  const double d = std::exp2(std::round(std::log2(kIncrement * (size > 0.0 ? size : 1.0))));
+  const double d = std::exp2(std::round(std::log2(kWideIncrement * (size > 0.0 ? size : 1.0))));
   shifted_.resize(g_p.size());
   return central_differences(d, g_p, shifted_, [&](double e, std::vector<double>& g) {
     *p.p = p.value + e;

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "host/rounding.hpp"
 #include "host/shortest.hpp"
 #include "rows/column_search.hpp"
 #include "start/linear_system.hpp"
@@ -19,7 +20,6 @@ namespace {
 // The search for the index costs two dense Jacobians by differences. Beyond this number of unknowns
 // it is made only if IDA's own Jacobian is of that kind, too.
 constexpr int kLargestSize = 200;
-constexpr double kIncrement = 1e-5;  // of y_j, against cancellation at tight tolerances
 
 using Near = NearbyResiduals;
 

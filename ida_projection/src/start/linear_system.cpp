@@ -4,13 +4,13 @@
 
 #include <tether/linalg/pivoted_qr.hpp>
 
+#include "host/rounding.hpp"
+
 namespace tether::ida_projection {
 
 namespace {
 
 constexpr int kHighestIndex = 4;
-// Parts of the largest pivot: difference quotients are good to 1e-6, products lose another digit.
-constexpr double kDependentPivot = 1e-6, kDependentProduct = 10.0 * kDependentPivot;
 
 }  // namespace
 
@@ -26,7 +26,7 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a, bool scale_rows) {
     if (scale_rows) scale(a.rowwise());
     scale(a.colwise());
   }
-  linalg::PivotedQr qr(kDependentPivot);
+  linalg::PivotedQr qr(kQuotientRounding);
   qr.factor(a);
   const Eigen::Index n = a.cols(), rank = qr.rank();
   if (rank == n) return {};
@@ -40,13 +40,13 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a, bool scale_rows) {
   std::vector<char> found(static_cast<std::size_t>(n));
   for (Eigen::Index j = 0; j < n; ++j)
     found[static_cast<std::size_t>(order[static_cast<std::size_t>(j)])] =
-        null.row(j).lpNorm<Eigen::Infinity>() > kDependentPivot;
+        null.row(j).lpNorm<Eigen::Infinity>() > kQuotientRounding;
   return found;
 }
 
 int differential_index(Eigen::MatrixXd E, Eigen::MatrixXd A) {
   const Eigen::Index n = E.rows();
-  linalg::PivotedQr qr(kDependentProduct);
+  linalg::PivotedQr qr(kProductRounding);
   for (int index = 0; index <= kHighestIndex; ++index) {
     for (Eigen::Index i = 0; i < n; ++i) {
       const double size = E.row(i).lpNorm<Eigen::Infinity>();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/owned_vector.hpp"
+#include "host/rounding.hpp"
 #include "movers/rows_at.hpp"
 #include "start/algebraic.hpp"
 #include "step/attempt.hpp"
@@ -18,7 +19,6 @@ class FirstSteps {
  public:
   /// Number of accepted steps in which rows and tolerances are checked.
   static constexpr long kSteps = 100;
-  static constexpr long kEvery = 64;  ///< steps, after these
 
   FirstSteps(const Constraints& constraints, RowFaults& faults)
       : constraints_(constraints), faults_(faults) {}
@@ -26,7 +26,7 @@ class FirstSteps {
   void reset();  ///< a new run starts
   /// Whether the step after `steps` accepted ones is checked.
   static bool are_checked(long steps) {
-    return steps >= kSettled && (steps <= kSteps || steps % kEvery == 0);
+    return steps >= kSettled && (steps <= kSteps || steps % kMeasureEvery == 0);
   }
   /// Whether a row was named that F does not keep.
   bool false_row_found() const { return run_.false_row_found; }

@@ -15,8 +15,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kNameAfter = 4;            // failures in a row, of which IDA gives up after ten
-constexpr double kChange = 1e-3;         // of max(1, |y_j|), for differences
 constexpr std::size_t kMostNamed = 200;  // algebraic variables, each an evaluation of F
 
 // The candidate as the searches want it.
@@ -91,7 +89,7 @@ std::string Observer::undetermined_multipliers(const Candidate& candidate, N_Vec
   for (std::size_t j = 0; j < at.size(); ++j) {
     const double w = candidate.weight_entries[j];
     if (w > 0.0) WT[j] = 1.0 / w;
-    change[j] = std::max(w > 0.0 ? WT[j] : 0.0, kChange * std::max(1.0, std::abs(at[j])));
+    change[j] = std::max(w > 0.0 ? WT[j] : 0.0, kWideIncrement * std::max(1.0, std::abs(at[j])));
     if (variables_.mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
   }
   if (algebraic.size() > kMostNamed) return {};
@@ -145,7 +143,8 @@ void Observer::corrector_failed(const Candidate& candidate, int flag) {
   else if (variables_.high_index())
     report_.message = "IDA's corrector failed" + rounding_of_multipliers() +
                       (run_.undetermined.empty() ? "" : "; " + run_.undetermined);
-  if (flag <= 0 || candidate.base_entries == nullptr || corrector_.failures_in_row() != kNameAfter)
+  if (flag <= 0 || candidate.base_entries == nullptr ||
+      corrector_.failures_in_row() != Report::kSayAfter)
     return;
   report_.advise(variables_.derive(candidate, corrector_));
   OwnedVector y;
@@ -249,7 +248,7 @@ void Observer::measure(const Candidate& candidate, const Move& move, RowsAt& row
   if (move.status == Status::success)
     statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, left);
   statistics_.seconds += std::chrono::duration<double>(Clock::now() - move_begun_).count() *
-                         static_cast<double>(tally_.attempts == 1 ? 1 : kTimed);
+                         static_cast<double>(tally_.attempts == 1 ? 1 : kOneIn);
 }
 
 void Observer::check_rows(const Attempt& attempt, const Candidate& candidate, N_Vector corrected,
@@ -267,7 +266,7 @@ void Observer::check_start(const Attempt& attempt, const Move& move) {
   const double before = std::exchange(run_.first_move, move.length);
   const bool stays = attempt.repeated && move.length > 1.0 && move.length > 0.5 * before;
   run_.refused_starts = stays ? run_.refused_starts + 1 : 0;
-  if (run_.refused_starts == kNameAfter)
+  if (run_.refused_starts == Report::kSayAfter)
     report_.warn(Status::doubtful,
                  "IDA's error test refuses the first step, however short it is: the start is " +
                      brief(move.length) +

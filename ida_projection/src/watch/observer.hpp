@@ -57,11 +57,11 @@ class Observer {
   /// is timed, which finds out what the others keep, and every 16th for the others. These see what
   /// g is left, too.
   void begin_move() {
-    if (tally_.attempts++ % kTimed == 0) move_begun_ = Clock::now();
+    if (tally_.attempts++ % kOneIn == 0) move_begun_ = Clock::now();
   }
   void after_move(const Attempt& attempt, const Candidate& candidate, const Move& move,
                   N_Vector corrected, RowsAt& rows) {
-    if ((tally_.attempts - 1) % kTimed == 0) measure(candidate, move, rows);
+    if ((tally_.attempts - 1) % kOneIn == 0) measure(candidate, move, rows);
     ++(move.not_needed ? statistics_.skipped : statistics_.projections);
     if (move.capped) ++statistics_.moves_capped;
     if (move.status != Status::success) return;
@@ -92,7 +92,6 @@ class Observer {
   using Clock = std::chrono::steady_clock;
   static constexpr long kWindow = 200;  // accepted steps, in which most attempts fail
   static constexpr long kMostMovedByFalseRow = 5 * kWindow;  // steps, before such a run ends
-  static constexpr long kTimed = 16;  // attempts: observations that cost are made in one of so many
   static constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
 
   struct Run {

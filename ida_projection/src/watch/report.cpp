@@ -8,10 +8,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-// Failures in one step after which they are printed; IDA gives up after ten. More are normal in the
-// first step, whose size IDA finds by trying.
-constexpr int kSayAfter = 4;
-
 bool is_fatal(Status status) { return static_cast<int>(status) < 0; }
 
 // The name of each status, and what counts it as a failure of a projection.
@@ -80,6 +76,7 @@ void Report::print_fatal(const char* text) noexcept {
 
 bool Report::prints_failures(long steps) const {
   const int failures = steps == failing_step_ ? failures_in_step_ + 1 : 1;
+  // More are normal in the first step, whose size IDA finds by trying.
   return failures >= (steps == 0 ? 2 * kSayAfter : kSayAfter);
 }
 

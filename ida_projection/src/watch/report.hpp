@@ -14,6 +14,9 @@ namespace tether::ida_projection {
 /// Outcomes of solves, counted in the statistics; what Projection::status() and message() tell.
 class Report {
  public:
+  /// Failures in a row after which their cause is told; IDA gives up after ten.
+  static constexpr int kSayAfter = 4;
+
   Report(const Options& options, Statistics& statistics)
       : options_(options), statistics_(statistics) {}
 

@@ -16,6 +16,9 @@ namespace {
 constexpr double kLeastShare = 1.0 / 3.0;  // of factor_kept()
 // Factors of A A^T determine the square of a larger sine to a relative error of 1e-10.
 constexpr double kLeastSine = 1e-3;
+// Of a unit row: where less is left of it, its digits are lost, and it is orthogonalised twice
+// ("twice is enough": Parlett, The Symmetric Eigenvalue Problem, 6.9).
+constexpr double kTwice = 0.1;
 
 // Computes |a| without overflow or underflow.
 double careful_norm(const Eigen::Ref<const Eigen::RowVectorXd>& a) {
@@ -24,9 +27,45 @@ double careful_norm(const Eigen::Ref<const Eigen::RowVectorXd>& a) {
 
 }  // namespace
 
-// A^T P = Q R, or A A^T = L L^T of the rows that take part.
+// P A = L Q, or A A^T = L L^T of the rows that take part.
 struct MinimumNorm::Large {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  // Modified Gram-Schmidt, of rows the one of which most is left first; A becomes Q. Returns the
+  // rank: of the next row no more than `tolerance` is left.
+  int orthogonalise(double tolerance, std::vector<int>& order) {
+    const auto m = static_cast<int>(A.rows());
+    L.setZero();
+    for (int i = 0; i < m; ++i) left[i] = A.row(i).squaredNorm();
+    for (int k = 0; k < m; ++k) {
+      Eigen::Index most = 0;
+      left.tail(m - k).maxCoeff(&most);
+      exchange(k, k + static_cast<int>(most), order);
+      for (int i = 0; i < k && left[k] < kTwice * kTwice; ++i) take(k, i);
+      const double length = A.row(k).norm();
+      if (!(length > tolerance)) return k;
+      L(k, k) = length;
+      A.row(k) *= 1.0 / length;
+      for (int i = k + 1; i < m; ++i) {
+        take(i, k);
+        left[i] = A.row(i).squaredNorm();
+      }
+    }
+    return m;
+  }
+  // Removes from row i its part along row k of Q.
+  void take(int i, int k) {
+    const double share = A.row(k).dot(A.row(i));
+    L(i, k) += share;
+    A.row(i) -= share * A.row(k);
+  }
+  void exchange(int i, int k, std::vector<int>& order) {
+    if (i == k) return;
+    A.row(i).swap(A.row(k));
+    L.row(i).swap(L.row(k));
+    std::swap(left[i], left[k]);
+    std::swap(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(k)]);
+  }
 
   // Returns the least L_kk of the first `rank` rows of A; 0 where A A^T is not positive definite.
   double factor(int rank) {
@@ -49,10 +88,9 @@ struct MinimumNorm::Large {
     factor.transpose().solveInPlace(z);
   }
 
-  Rows A;  // unit rows; of factor_kept() in pivot order
+  Rows A;  // unit rows, or those of Q; factored ones in pivot order
   Rows L;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-  Eigen::VectorXd work, rhs;
+  Eigen::VectorXd left, rhs;  // left: square of what is left of each row
 };
 
 MinimumNorm::MinimumNorm() : large_(std::make_unique<Large>()) {}
@@ -81,9 +119,8 @@ void MinimumNorm::resize(int rows, int columns) {
     solve_few_ = few_->solve;
   }
   large_->A.resize(rows, columns);
-  large_->qr = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(columns, rows);
-  large_->work.resize(std::max(rows, columns));
-  large_->rhs.resize(std::max(rows, columns));
+  large_->left.resize(rows);
+  large_->rhs.resize(rows);
   large_->L.resize(rows, rows);
   order_.resize(m);
   std::iota(order_.begin(), order_.end(), 0);
@@ -172,14 +209,9 @@ bool MinimumNorm::factor_gram(const double* wide, int width, const int* rows, co
 }
 
 void MinimumNorm::factor_orthogonal(double rank_tolerance) {
-  auto& qr = large_->qr;
   factors_ = Factors::orthogonal;
-  if (m_ == 0 || n_ == 0) return;
-  qr.setThreshold(rank_tolerance);
-  qr.compute(large_->A.transpose());
-  const int* const pivots = qr.colsPermutation().indices().data();
-  order_.assign(pivots, pivots + m_);
-  rank_ = factored_rank_ = qr.maxPivot() > rank_tolerance ? static_cast<int>(qr.rank()) : 0;
+  std::iota(order_.begin(), order_.end(), 0);
+  rank_ = factored_rank_ = large_->orthogonalise(rank_tolerance, order_);
   least_square_ = rank_ > 0 ? std::pow(independent_part(rank_ - 1), 2) : 1.0;
 }
 
@@ -204,25 +236,19 @@ void MinimumNorm::solve_gram(const double* g, double* dy) {
 }
 
 void MinimumNorm::solve_orthogonal(const double* g, double* dy) {
-  auto& qr = large_->qr;
-  auto& work = large_->work;
-  auto& rhs = large_->rhs;
-  const auto& R = qr.matrixQR();
-  for (int k = 0; k < rank_; ++k) rhs[k] = scaled(g, pivot(k));
-  R.topLeftCorner(rank_, rank_)
-      .triangularView<Eigen::Upper>()
-      .transpose()
-      .solveInPlace(rhs.head(rank_));
-  for (int k = rank_; k < m_; ++k)
-    inconsistency_[static_cast<std::size_t>(k)] =
-        std::abs(scaled(g, pivot(k)) - R.col(k).head(rank_).dot(rhs.head(rank_)));
-
-  Eigen::Map<Eigen::VectorXd> du(dy, n_);
+  auto& z = large_->rhs;
+  const auto& L = large_->L;
+  for (int k = 0; k < m_; ++k) {
+    double left = scaled(g, pivot(k));
+    for (int i = 0; i < std::min(k, rank_); ++i) left -= L(k, i) * z[i];
+    if (k < rank_)
+      z[k] = left / L(k, k);
+    else
+      inconsistency_[static_cast<std::size_t>(k)] = std::abs(left);
+  }
+  Eigen::Map<Eigen::RowVectorXd> du(dy, n_);
   du.setZero();
-  du.head(rank_) = rhs.head(rank_);
-  for (int k = rank_ - 1; k >= 0; --k)
-    du.tail(n_ - k).applyHouseholderOnTheLeft(R.col(k).tail(n_ - k - 1), qr.hCoeffs()[k],
-                                              work.data());
+  for (int k = 0; k < rank_; ++k) du += z[k] * large_->A.row(k);
   for (int j = 0; j < n_; ++j) dy[j] *= metric_[static_cast<std::size_t>(j)];
 }
 
@@ -238,15 +264,14 @@ std::vector<double> MinimumNorm::dependence(int k) const {
     x = large_->A.topRows(r) * large_->A.row(k).transpose();
     large_->solve(r, x);
   } else {
-    x = large_->qr.matrixQR().col(k).head(r);
-    large_->qr.matrixQR().topLeftCorner(r, r).triangularView<Eigen::Upper>().solveInPlace(x);
+    x = large_->L.row(k).head(r);
+    large_->L.topLeftCorner(r, r).triangularView<Eigen::Lower>().transpose().solveInPlace(x);
   }
   return {x.data(), x.data() + r};
 }
 
 double MinimumNorm::independent_part(int k) const {
-  if (factors_ == Factors::few) return std::sqrt(few_->ratio[k]);
-  return factors_ == Factors::gram ? large_->L(k, k) : std::abs(large_->qr.matrixQR()(k, k));
+  return factors_ == Factors::few ? std::sqrt(few_->ratio[k]) : large_->L(k, k);
 }
 
 double MinimumNorm::condition() const {

@@ -17,10 +17,10 @@ struct KeptRows;
 ///
 ///     min sum_j (dy_j / D_j)^2   subject to   C dy = g.
 ///
-/// With A = S C D, S = diag(1 / |row_i(C D)|), the columns of A^T are unit vectors. They are made
-/// orthogonal with pivoting, A^T P = Q [R11 R12; 0 0] (Golub and Van Loan, sections 5.4 and 5.6.2);
-/// then dy = D Q [R11^-T (P^T S g)_1..r; 0]. Because the rows are unit vectors, the rank decision
-/// |R_kk| > rank_tolerance does not depend on the units of g. A A^T is not formed for it.
+/// The rows of A = S C D, S = diag(1 / |row_i(C D)|), are unit vectors. They are made orthogonal
+/// with pivoting, P A = [L11; L21] Q (modified Gram-Schmidt: Golub and Van Loan, sections 5.2.8 and
+/// 5.6.2); then dy = D Q^T L11^-1 (P S g)_1..r. Because the rows are unit vectors, the rank
+/// decision L_kk > rank_tolerance does not depend on the units of g. A A^T is not formed for it.
 ///
 /// Many rows of few entries are for SparseMinimumNorm. resize() allocates, factor() and solve() do
 /// not.
@@ -76,7 +76,7 @@ class MinimumNorm {
   int dropped() const { return m_ - rank_; }  ///< rows that do not
   /// Original index of the k-th row in pivot order: k < rank() kept, k >= rank() dropped.
   int pivot(int k) const { return order_[static_cast<std::size_t>(k)]; }
-  /// |R_kk|, k < rank(): how much of a unit row is independent of those before it. From factor() no
+  /// L_kk, k < rank(): how much of a unit row is independent of those before it. From factor() no
   /// larger than the one before.
   double independent_part(int k) const;
   /// The square of the smallest one that factor() has kept; 1 for rank 0.
@@ -84,12 +84,12 @@ class MinimumNorm {
   /// |row_i(C D)|; 0 for a row that vanishes.
   double row_norm(int i) const;
   /// After solve(): the part of dropped row k (k in rank()..m-1, pivot order) that the solution
-  /// leaves unsolved, as a distance in the metric: |S g - R12^T R11^-T (P^T S g)_1..r|. A vanished
+  /// leaves unsolved, as a distance in the metric: |S g - L21 L11^-1 (P S g)_1..r|. A vanished
   /// row has no distance; its |g| itself is returned.
   double inconsistency(int k) const { return inconsistency_[static_cast<std::size_t>(k)]; }
   /// Coefficients over the kept rows (pivot order, rank() entries) that give dropped row k.
   std::vector<double> dependence(int k) const;
-  /// Ratio of the largest to the smallest kept |R_kk|: a cheap estimate of the condition of S C D.
+  /// Ratio of the largest to the smallest kept L_kk: a cheap estimate of the condition of S C D.
   double condition() const;
 
  private:
