@@ -10,8 +10,8 @@ namespace tether::python {
 
 namespace {
 
-tc::ConeProblem make_problem(const py::object& A, const Array& b, std::vector<tc::Cone> cones,
-                             const py::object& compliance) {
+tc::ConeProblem make_cone_problem(const py::object& A, const Array& b, std::vector<tc::Cone> cones,
+                                  const py::object& compliance) {
   const View rows = vector("b", b);
   return tc::ConeProblem::sparse(matrix_entries("A", A, b.size(), b.size()), rows, std::move(cones),
                                  entries("compliance", compliance));
@@ -81,7 +81,7 @@ A: (n, n) array or scipy.sparse matrix, b: (n,), cones: list of Cone whose rows 
 their order; compliance: (n,) velocity over impulse of each row, >= 0, added to the diagonal of A.
 Rows of any units. A may be singular (redundant joints, many contacts). Raises ValueError on sizes
 that do not match, values that are not finite or out of range and contacts that nothing moves.)")
-      .def(py::init(&make_problem), "A"_a, "b"_a, "cones"_a, "compliance"_a = py::none())
+      .def(py::init(&make_cone_problem), "A"_a, "b"_a, "cones"_a, "compliance"_a = py::none())
       .def_static("saddle", &make_saddle, "M"_a, "J"_a, "f"_a, "bias"_a, "cones"_a,
                   "compliance"_a = py::none(),
                   R"(M v = J' x + f, w = J v + bias.

@@ -151,10 +151,10 @@ struct Result {
   }
 };
 
-Result solve(const py::object& residual, const Array& times, const py::object& y0,
-             const py::object& yp0, const py::object& g, const py::object& C,
-             const py::object& jacobian, double rtol, const py::object& atol,
-             const py::object& algebraic, long max_steps, bool make_consistent) {
+Result solve_equations(const py::object& residual, const Array& times, const py::object& y0,
+                       const py::object& yp0, const py::object& g, const py::object& C,
+                       const py::object& jacobian, double rtol, const py::object& atol,
+                       const py::object& algebraic, long max_steps, bool make_consistent) {
   if (times.ndim() != 1 || times.size() < 2)
     refuse("times has shape " + shape(times) + ", must be a vector of at least two");
   for (py::ssize_t i = 0; i < times.size(); ++i)
@@ -275,7 +275,7 @@ void bind_ida(py::module_& module) {
       .def_readonly("message", &Result::message, "what went wrong; empty when all is well")
       .def_readonly("statistics", &Result::statistics, "of the projection, as a table");
 
-  module.def("solve", &solve, "residual"_a, "times"_a, "y0"_a, "yp0"_a, py::kw_only(),
+  module.def("solve", &solve_equations, "residual"_a, "times"_a, "y0"_a, "yp0"_a, py::kw_only(),
              "constraints"_a = py::none(), "constraint_jacobian"_a = py::none(),
              "jacobian"_a = py::none(), "rtol"_a = 1e-6, "atol"_a = 1e-6,
              "algebraic"_a = py::none(), "max_steps"_a = 1000000, "make_consistent"_a = false,

@@ -487,6 +487,7 @@ TEST_CASE("an island that is never solved: the best point is returned, not the l
       v[b] -= p.bodies[b].inverse_mass * one.impulses[k];
     }
     for (std::size_t k = 0; k < v.size(); ++k) REQUIRE((v[k] - one.velocities[k]).norm() < 1e-12);
+    if (sweeps != 100 && sweeps != 1200) continue;
     for (int threads : {2, 3}) {
       o.threads = threads;
       const BodySolution more = BodySolver(o).solve(p.bodies, p.contacts);
@@ -516,6 +517,7 @@ TEST_CASE("body form: no allocation in steady state") {
     o.tolerance = 1e-4;
     o.threads = threads;
     o.max_assembled = 0;
+    o.max_sweeps = 1000;  // before the warm start the general contacts cycle without end
     BodySolver solver(o);
     BodySolution s;
     for (int step = 0; step < 2; ++step) solver.solve(a.bodies, a.contacts, s);

@@ -76,10 +76,12 @@ TEST_CASE("packings: 5300 contacts are solved by sweeps") {
 
 // Sweeps do not come near: they leave 5e-4 and 9e-4 after 2.2e9. What is unstable under them is 10
 // to 50 contacts each, at a few places. When these are found depends on rounding: 6e8 to 1.4e9 for
-// the same lattice with mu changed by 1e-13, so one of three may take longer.
+// the same lattice with mu changed by 1e-13, so some of three may take longer: the first that is
+// solved is enough.
 TEST_CASE("packings: parts that are unstable under sweeps follow them, 10600 contacts") {
-  int found = 0;
-  for (std::uint64_t seed : {1, 2, 3}) {
+  bool found = false;
+  for (std::uint64_t seed : {3, 1, 2}) {
+    if (found) break;
     const random::Packing packing = random::close_packing(10, false, 1, seed);
     const Problem p = delassus(packing.bodies, to_contacts(packing.contacts));
     REQUIRE(p.contacts() > 10000);
@@ -87,9 +89,9 @@ TEST_CASE("packings: parts that are unstable under sweeps follow them, 10600 con
     o.law = Law::coulomb;
     o.tolerance = 1e-6;
     o.max_work = 2e9;
-    found += is_solved(p, o);
+    found = is_solved(p, o);
   }
-  CHECK(found >= 1);
+  CHECK(found);
 }
 
 // 16 of 20; 9 where sweeps were left for interior points from sticking or near the result and for
@@ -244,6 +246,8 @@ TEST_CASE("packings: bodies that sweeps leave unsolved are assembled, 1200 conta
     // Sweeps solve the spheres for half the price of the assembled problem.
     CHECK(s.assembled_islands == (spheres ? 0 : 1));
     CHECK(evaluate(p.bodies, p.contacts, o.law, s.impulses).fixed_point <= 1e-6);
+    o.max_work = 1e8;  // enough to assemble and solve
+    CHECK(BodySolver(o).solve(p.bodies, p.contacts).assembled_islands == (spheres ? 0 : 1));
     o.max_assembled = 1000;
     CHECK(BodySolver(o).solve(p.bodies, p.contacts).assembled_islands == 0);
     o.max_assembled = 100000;

@@ -3,6 +3,12 @@
 
 namespace tether::test {
 
+namespace {
+
+using Decomposition = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>;
+
+}  // namespace
+
 Eigen::VectorXd oracle(const Case& c) {
   RowMajor A = c.C * c.D.asDiagonal();
   Eigen::VectorXd g = c.g;
@@ -15,10 +21,26 @@ Eigen::VectorXd oracle(const Case& c) {
     A.row(i) /= length;
     g[i] /= length;
   }
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
+  Decomposition factors;
   factors.setThreshold(1e-12);
   factors.compute(A);
   return c.D.cwiseProduct(factors.solve(g));
+}
+
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {
+  return Decomposition(A).solve(b);
+}
+
+int rank_of(const Eigen::MatrixXd& A, double threshold) {
+  Decomposition factors;
+  factors.setThreshold(threshold);
+  factors.compute(A);
+  return static_cast<int>(factors.rank());
+}
+
+SingularVectors singular_vectors(const Eigen::MatrixXd& A) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return {svd.singularValues(), svd.matrixU(), svd.matrixV()};
 }
 
 }  // namespace tether::test

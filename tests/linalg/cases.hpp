@@ -40,6 +40,19 @@ inline Case random_case(int m, int n, unsigned seed) {
 /// dy = D (C D)^+ g by a complete orthogonal decomposition of the rows brought to unit length.
 Eigen::VectorXd oracle(const Case& c);
 
+/// The shortest x of min |A x - b|, by the same decomposition.
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+/// Pivots of that decomposition above `threshold` times the largest.
+int rank_of(const Eigen::MatrixXd& A, double threshold);
+
+/// A v_k = sigma_k u_k, the largest first.
+struct SingularVectors {
+  Eigen::VectorXd sigma;
+  Eigen::MatrixXd U, V;
+};
+SingularVectors singular_vectors(const Eigen::MatrixXd& A);
+
 inline void load(linalg::MinimumNorm& solver, const RowMajor& C) {
   for (int i = 0; i < C.rows(); ++i)
     for (int j = 0; j < C.cols(); ++j) solver.row(i)[j] = C(i, j);

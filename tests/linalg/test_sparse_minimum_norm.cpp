@@ -314,9 +314,7 @@ TEST_CASE("rows with large coefficients over those before are told from independ
   SparseMinimumNorm solver = factored_net(c, 3.25e-7);
   Eigen::MatrixXd A = dense_rows(c);
   A.rowwise().normalize();
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
-  qr.setThreshold(1e-10);
-  CHECK(solver.rank() == qr.rank());
+  CHECK(solver.rank() == rank_of(A, 1e-10));
 }
 
 TEST_CASE("the row that closes a loop is redundant, however long it is") {
@@ -348,20 +346,19 @@ TEST_CASE("the row that closes a loop is redundant, however long it is") {
 
 TEST_CASE("every direction of a net, however thin: at most the least norm, and no residual grows") {
   const SparseCase c = net(8, 1.5);
-  const RowMajor A = dense_rows(c);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const SingularVectors svd = singular_vectors(dense_rows(c));
   SparseMinimumNorm solver = factored_net(c);
   int thin = 0;
-  for (Eigen::Index k = 0; k < svd.singularValues().size(); ++k) {
-    const double sigma = svd.singularValues()[k];
+  for (Eigen::Index k = 0; k < svd.sigma.size(); ++k) {
+    const double sigma = svd.sigma[k];
     INFO("singular value " << sigma);
-    const Eigen::VectorXd b = svd.matrixU().col(k), x = solve(solver, b);
+    const Eigen::VectorXd b = svd.U.col(k), x = solve(solver, b);
     thin += sigma < 1e-3;
     CHECK(solver.residual() <= 1.0 + 1e-12);
     if (sigma > 1e-14) CHECK(x.norm() <= 2.0 / sigma);
     if (sigma > 1e-6) {
       CHECK(solver.residual() < 1e-6);
-      CHECK((x - svd.matrixV().col(k) / sigma).norm() <= 1e-6 / sigma);
+      CHECK((x - svd.V.col(k) / sigma).norm() <= 1e-6 / sigma);
     }
   }
   CHECK(thin >= 6);
@@ -373,7 +370,6 @@ TEST_CASE("what no motion of a net can give is told by rows, in any units of the
     SparseCase c = net(8, 1.5);
     for (double& value : c.values) value *= unit;
     const RowMajor A = dense_rows(c);
-    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> least(A);
     SparseMinimumNorm solver = factored_net(c);
     REQUIRE(solver.dropped() > 0);
     std::mt19937 random(8);
@@ -381,7 +377,7 @@ TEST_CASE("what no motion of a net can give is told by rows, in any units of the
     const int row = solver.pivot(solver.rank());
     b[row] += 0.25 * solver.row_norm(row);
     const Eigen::VectorXd x = solve(solver, b);
-    const double expected = (A * least.solve(b) - b).norm();
+    const double expected = (A * least_squares(A, b) - b).norm();
     CHECK((A * x - b).norm() == Approx(expected).epsilon(1e-3));
     CHECK(solver.residual() == Approx(expected / b.norm()).epsilon(1e-3));
     // The changed row is off by what was added to it.
