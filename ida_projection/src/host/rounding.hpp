@@ -18,8 +18,8 @@ constexpr double kIncrement = 1e-5, kWideIncrement = 1e-3;
 /// them lose another digit.
 constexpr double kQuotientRounding = 1e-6, kProductRounding = 10.0 * kQuotientRounding;
 
-/// What costs as much as the rest of an attempt is done in one of so many; what changes slowly is
-/// measured anew in one of so many.
+/// Observations that cost as much as the rest of an attempt are made in one of kOneIn attempts;
+/// quantities that change slowly are measured anew in one of kMeasureEvery.
 constexpr int kOneIn = 16;
 constexpr long kMeasureEvery = 64;
 

@@ -260,9 +260,10 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
   void fill_metric() {
     if (metric_.find(at_))
-      rows_.set_metric([this](int j) { return metric_.D(static_cast<std::size_t>(j)); });
+      rows_.set_metric(
+          [s = metric_.s(), w = at_.weight_entries](int j) { return LocalMetric::D(s[j], w[j]); });
     else
-      rows_.set_metric([D = metric_.D().data()](int j) { return D[j]; });
+      rows_.set_metric([D = metric_.D()](int j) { return D[j]; });
   }
   void place(const Candidate& candidate) {
     at_ = candidate;

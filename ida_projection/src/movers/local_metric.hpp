@@ -24,7 +24,7 @@ class LocalMetric {
         D_(scale_) {}
 
   /// Updates s with the present candidate, which accept() keeps. True: each D_i follows from its s
-  /// alone, D(i); else all of D().
+  /// alone, D(s, w); else D() has them all.
   bool find(const Candidate& at) {
     const std::size_t n = scale_.size();
     double* __restrict trial = trial_scale_.data();
@@ -32,24 +32,25 @@ class LocalMetric {
     const double* __restrict ycor = at.correction_entries;
     for (std::size_t i = 0; i < n; ++i)
       trial[i] = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
-    weights_ = at.weight_entries;
+    const double* const w = at.weight_entries;
     const std::vector<int>& groups = levels_.empty() ? options_.group : levels_;
     const bool local = options_.advanced.metric == Metric::local_correction;
     if (local && groups.empty() && !by_rates()) return true;
     // A component without a weight (WT = 0) has the corrector's change as its scale.
     for (std::size_t i = 0; i < n; ++i)
-      D_[i] = local ? D(i) : weights_[i] > 0.0 ? 1.0 / weights_[i] : trial[i];
+      D_[i] = local ? D(trial[i], w[i]) : w[i] > 0.0 ? 1.0 / w[i] : trial[i];
     if (local && !groups.empty())
-      share(weights_, groups);
+      share(w, groups);
     else if (local)
       limit(at.h);
     return false;
   }
-  double D(std::size_t i) const {
-    const double s = trial_scale_[i], w = weights_[i];
+  /// D of a component, from its s and weight.
+  static double D(double s, double w) {
     return std::max(s, kMetricFloor * (w > 0.0 ? 1.0 / w : s));
   }
-  const std::vector<double>& D() const { return D_; }
+  const double* s() const { return trial_scale_.data(); }
+  const double* D() const { return D_.data(); }
   /// One scale for each of these groups, in place of Options::group; empty: no longer.
   void use_levels(std::vector<int> levels) { levels_ = std::move(levels); }
   /// Unknowns of level 1 are the rates of those of level 0: scales obey that from now on, see
@@ -106,7 +107,6 @@ class LocalMetric {
 
   const Options& options_;
   std::vector<double> scale_, trial_scale_;  // s_i: committed, and with the present candidate
-  const double* weights_ = nullptr;          // of that candidate
   std::vector<double> D_;
   std::vector<int> levels_, levels_of_rates_;
   std::vector<double> group_sum_;

@@ -172,7 +172,7 @@ class SplitRows {
   template <class Metric>
   void set_metric(Metric D) {
     for_blocks([&D](Block& block) {
-      block.for_columns([&D, to = block.D()](int k, int j) { to[k] = D(j); });
+      block.for_columns([D, to = block.D()](int k, int j) { to[k] = D(j); });
     });
   }
   /// From C and the metric. False: an entry is not finite.
