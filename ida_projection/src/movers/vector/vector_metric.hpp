@@ -7,6 +7,7 @@
 
 #include "host/candidate.hpp"
 #include "host/owned_vector.hpp"
+#include "movers/local_metric.hpp"
 
 namespace tether::ida_projection {
 
@@ -28,11 +29,11 @@ class VectorMetric {
   }
   /// Components that are zero in `id` do not move.
   void hold_all_but(N_Vector id) { N_VProd(free_, id, free_); }
-  /// s <- max(0.8 s, |correction|), which accept() keeps; uses two vectors as work space.
+  /// s <- max(kMetricDecay s, |correction|), which accept() keeps; uses two vectors as work space.
   void update_scale(const Candidate& candidate, OwnedVector& changes, OwnedVector& spare) {
     if (!local()) return;
     N_VAbs(candidate.correction, changes);
-    larger(0.8, scale_, changes, trial_, spare);
+    larger(kMetricDecay, scale_, changes, trial_, spare);
   }
   /// WT (0 where w = 0) and D.
   void set(const Candidate& candidate, OwnedVector& spare) {
@@ -42,7 +43,7 @@ class VectorMetric {
     else
       N_VInv(candidate.weights, WT_);
     if (local())
-      larger(1e-3, WT_, trial_, D_, spare);
+      larger(kMetricFloor, WT_, trial_, D_, spare);
     else
       N_VScale(1.0, WT_, D_);
     N_VProd(D_, free_, D_);
