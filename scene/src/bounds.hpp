@@ -21,6 +21,8 @@ constexpr std::size_t kMostInColumns = 200;
 /// Bodies beyond which pictures leave something out.
 constexpr std::size_t kManyBodies = 300;
 
+/// Rows of unit length of which those before them leave no more than this depend on these.
+constexpr double kDependentRow = 1e-10;
 /// A time so near to the boundary of a step, in steps, is that of the boundary up to rounding.
 constexpr double kSameBoundary = 1e-9;
 

@@ -153,28 +153,27 @@ TEST_CASE("event: the second derivative of round contacts is that of their gap")
   const Round other{{0, 0, 0.1}, Vector3d(0.6, 0.7, 0.2).asDiagonal(), 0.05, Vector3d::Zero()};
   const Segment line{{-1, 0.2, 0}, Vector3d(1, 0.3, 0.2).normalized(), 2, 0.1, {}};
   const PlaneFeature plane{{0, 0, 0.1}, Vector3d(0.1, 0.2, 1).normalized(), {}};
-  const Vector3d origin = Vector3d::Zero();
   const std::vector<std::function<Touch(const Frame<double>&, const Frame<double>&)>> looks = {
       [&](const auto& a, const auto& b) {
-        return RoundOnPlane{oval, plane, 0}.touch(a, b, origin, 0);
+        return RoundOnPlane{oval, plane, 0}.touch(a, b);
       },
       [&](const auto& a, const auto& b) {
-        return RoundOnPlane{disc, plane, 0}.touch(a, b, origin, 0);
+        return RoundOnPlane{disc, plane, 0}.touch(a, b);
       },
       [&](const auto& a, const auto& b) {
-        return RoundOnRound{oval, other}.touch(a, b, origin, 0);
+        return RoundOnRound{oval, other}.touch(a, b);
       },
       [&](const auto& a, const auto& b) {
-        return RoundOnRound{disc, other}.touch(a, b, origin, 0);
+        return RoundOnRound{disc, other}.touch(a, b);
       },
       [&](const auto& a, const auto& b) {
-        return RoundOnLine{oval, line}.touch(a, b, origin, 0);
+        return RoundOnLine{oval, line}.touch(a, b);
       },
       [&](const auto& a, const auto& b) {
-        return RoundOnLine{disc, line}.touch(a, b, origin, 0);
+        return RoundOnLine{disc, line}.touch(a, b);
       },
       [&](const auto& a, const auto& b) {
-        return PointOnCircle{{0, 0.1, 0}, Vector3d::UnitZ(), 0.6}.touch(a, b, {0.1, 0, 0}, 0.2);
+        return PointOnCircle{{{0.1, 0, 0}, 0.2}, {0, 0.1, 0}, Vector3d::UnitZ(), 0.6}.touch(a, b);
       }};
   for (std::size_t k = 0; k < looks.size(); ++k) {
     CAPTURE(k);

@@ -33,7 +33,7 @@ struct CableForces : Force {
       const Slopes slopes = slopes_of(bodies, each);
       const CableTension now(each, bodies);
       for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
-        const auto [A, B] = seed_piece(bodies, each, k);
+        const auto [A, B] = seed_pair(bodies, each.points[k].body, each.points[k + 1].body);
         const Piece<Dual> piece(A, each.points[k].at, B, each.points[k + 1].at);
         Wrench<Dual> a = no_wrench<Dual>(), b = a;
         piece.pull(A, B, now.tension, a, b);
@@ -135,12 +135,6 @@ struct CableForces : Force {
     std::vector<Derivatives> length, rate;
   };
 
-  static std::pair<Frame<Dual>, Frame<Dual>> seed_piece(const Bodies& bodies, const CableItem& each,
-                                                        std::size_t k) {
-    return {
-        seed(each.frame(bodies, k), bodies.moves(each.points[k].body), 0),
-        seed(each.frame(bodies, k + 1), bodies.moves(each.points[k + 1].body), kBodyDirections)};
-  }
   template <class Do>
   static void each_wrench(const Bodies& bodies, const CableItem& each, double T, const Do& act) {
     each.each_wrench(
@@ -155,7 +149,7 @@ struct CableForces : Force {
       second.head<kBodyDirections>() += value.derivatives().tail<kBodyDirections>();
     };
     for (std::size_t k = 0; k + 1 < each.points.size(); ++k) {
-      const auto [A, B] = seed_piece(bodies, each, k);
+      const auto [A, B] = seed_pair(bodies, each.points[k].body, each.points[k + 1].body);
       const Piece<Dual> piece(A, each.points[k].at, B, each.points[k + 1].at);
       add_parts(piece.length, out.length[k], out.length[k + 1]);
       add_parts(piece.rate, out.rate[k], out.rate[k + 1]);

@@ -1,6 +1,7 @@
 // Tether: all effects. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "bounds.hpp"
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {
@@ -17,6 +18,12 @@ bool has_joint_laws(const Scene& scene);
 
 /// When forces have kinks or jump: in order, each once, after t = 0.
 std::vector<double> kinks_of(const Scene& scene);
+
+/// The first of these after t; infinite: there is none.
+inline double next_kink(const std::vector<double>& kinks, double t) {
+  const auto next = std::upper_bound(kinks.begin(), kinks.end(), t);
+  return next != kinks.end() ? *next : kInfinity;
+}
 
 /// Components of momentum and angular momentum that all effects together conserve.
 mechanics::Momenta momenta_of(const Scene& scene);

@@ -148,13 +148,13 @@ bool JointLaws::shares_tension(int law) const {
 
 bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
                               contact::JointLaws& laws) const {
-  constexpr double kSettled = 1e-9, kAtBound = 1 - 1e-9;
+  constexpr double kSame = 1e-9;  // of a bound
   const int first = count() - static_cast<int>(slips_.size());
   double change = 0, largest = 0;
   const auto force = [&](std::size_t ring) {
     const double x = impulses[at(first) + ring] / dt;
     const double bound = laws[first + static_cast<int>(ring)].bound;
-    const bool holds = x == 0 || std::abs(x) < kAtBound * bound;
+    const bool holds = x == 0 || std::abs(x) < (1 - kSame) * bound;
     return holds ? std::pair(x, 0.0) : std::pair(0.0, x > 0 ? 1.0 : -1.0);
   };
   effects::share_tensions(grips_, 1, force, [&](std::size_t ring, double bound) {
@@ -164,7 +164,7 @@ bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
     largest = std::max(largest, bound);
     laws.set_bound(law, bound);
   });
-  return change > kSettled * largest;
+  return change > kSame * largest;
 }
 
 // One law after the other: a term goes to the law added last.

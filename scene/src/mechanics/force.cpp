@@ -94,7 +94,7 @@ void SteppedBodies::push(int body, double dt, const Vector3d& force, const Vecto
 void Force::step(SteppedBodies& stepped, double dt) const {
   const Bodies& bodies = stepped.bodies();
   std::vector<Load6>& loads = stepped.loads();
-  for (Load6& load : loads) load.force = load.torque_body = load.torque_world = Vector3d::Zero();
+  clear(loads);
   add(bodies, loads);
   for (int b = 0; b < bodies.world(); ++b) {
     if (!bodies.moves(b)) continue;

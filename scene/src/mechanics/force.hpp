@@ -46,6 +46,9 @@ inline Vector3d direction_in(const Frame<double>& f, const Vector3d& u) {
 struct Load6 {
   Vector3d force, torque_body, torque_world;
 };
+inline void clear(std::vector<Load6>& loads) {
+  for (Load6& load : loads) load.force = load.torque_body = load.torque_world = Vector3d::Zero();
+}
 
 /// Frames of all bodies and, last, of the world: positions and attitudes of the scene, at rest; no
 /// inertia, and nothing moves yet.

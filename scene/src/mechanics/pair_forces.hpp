@@ -5,6 +5,12 @@
 
 namespace tether::scene::mechanics {
 
+/// The frames of a pair with their derivatives, those of the first body in front.
+inline std::pair<Frame<Dual>, Frame<Dual>> seed_pair(const Bodies& bodies, int first, int second) {
+  return {seed(bodies.frames[at(first)], bodies.moves(first), 0),
+          seed(bodies.frames[at(second)], bodies.moves(second), kBodyDirections)};
+}
+
 /// Adds the wrench on a body to the loads.
 inline void put_wrench(const Bodies& bodies, int body, const Wrench<double>& wrench,
                        std::vector<Load6>& loads) {
@@ -58,7 +64,7 @@ class PairForces : public Force {
   }
   void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Item& each : items_) {
-      const auto frames = seed_pair(bodies, each);
+      const auto frames = seed_pair(bodies, each.first, each.second);
       const auto [a, b] = pair_of<Dual>(bodies.time, each, frames, true);
       put_wrench(bodies, each.first, each.second, each.first, frames.first, a, J);
       put_wrench(bodies, each.first, each.second, each.second, frames.second, b, J);
@@ -91,7 +97,7 @@ class PairForces : public Force {
   }
   void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Item& each : items_) {
-      const auto [A, B] = seed_pair(bodies, each);
+      const auto [A, B] = seed_pair(bodies, each.first, each.second);
       const Dual P = each.works() ? each.template power<Dual>(bodies.time, A, B) : Dual(0.0);
       J.add_body(J.work_row, bodies, each.first, P.derivatives(), 0, -1.0);
       J.add_body(J.work_row, bodies, each.second, P.derivatives(), kBodyDirections, -1.0);
@@ -116,10 +122,6 @@ class PairForces : public Force {
   }
 
  private:
-  static std::pair<Frame<Dual>, Frame<Dual>> seed_pair(const Bodies& bodies, const Item& each) {
-    return {seed(bodies.frames[at(each.first)], bodies.moves(each.first), 0),
-            seed(bodies.frames[at(each.second)], bodies.moves(each.second), kBodyDirections)};
-  }
   std::vector<Item> items_;
 };
 

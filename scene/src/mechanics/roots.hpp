@@ -14,10 +14,11 @@ struct Bracket {
   double a, fa, b, fb;
 };
 
+constexpr int kMostIterations = 80;
+
 /// Shortens a bracket to `resolution` by Illinois' rule.
 template <class F>
 Bracket narrowed(const F& f, Bracket at, double resolution) {
-  constexpr int kMostIterations = 80;
   auto [a, fa, b, fb] = at;
   int side = 0;
   for (int k = 0; k < kMostIterations && std::abs(b - a) > resolution; ++k) {

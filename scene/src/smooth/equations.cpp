@@ -5,7 +5,7 @@
 namespace tether::scene::smooth {
 
 void System::sum_forces(Stopwatch* watch) {
-  for (Load6& load : loads_) load.force = load.torque_body = load.torque_world = Vector3d::Zero();
+  clear(loads_);
   for (std::size_t i = 0; i < forces_.size(); ++i) {
     forces_[i]->add(bodies_.all(), loads_);
     if (watch) watch->lap(i);

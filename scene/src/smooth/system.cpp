@@ -2,7 +2,7 @@
 #include "system.hpp"
 
 #include "effects/list.hpp"
-#include "mechanics/frames.hpp"
+#include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::smooth {
 
@@ -178,8 +178,7 @@ void System::row_jacobian(double t, const double* y, const Place& entries) {
   };
   rows_.each([&](const auto& row) {
     const Inertia &ia = bodies.inertia[at(row.first)], &ib = bodies.inertia[at(row.second)];
-    const Frame<Dual> A = seed(bodies.frames[at(row.first)], ia.slot >= 0, 0);
-    const Frame<Dual> B = seed(bodies.frames[at(row.second)], ib.slot >= 0, kBodyDirections);
+    const auto [A, B] = seed_pair(bodies, row.first, row.second);
     Dual g[3], rate[3];
     row.template rows<0>(A, B, g);
     row.template rows<1>(A, B, rate);

@@ -17,7 +17,7 @@
 #include <chrono>
 #include <tether/ida_projection.hpp>
 
-#include "bounds.hpp"
+#include "effects/list.hpp"
 #include "joints/joint_rows.hpp"
 #include "smooth/rows/rows_in_use.hpp"
 #include "smooth/terms.hpp"
@@ -89,10 +89,7 @@ class System {
 
   void bodies(const double* y, std::vector<BodyState>& out) const { bodies_.read(y, out); }
   /// The first time after t at which forces have a kink or jump; infinite: there is none.
-  double next_kink(double t) const {
-    const auto next = std::upper_bound(kinks_.begin(), kinks_.end(), t);
-    return next != kinks_.end() ? *next : kInfinity;
-  }
+  double next_kink(double t) const { return effects::next_kink(kinks_, t); }
   Diagnostics diagnostics(double t, const double* y);  ///< drift in SI, the rest in units()
   /// In units().
   scene::Forces forces(double t, const double* y, const joints::Reactions& reactions);

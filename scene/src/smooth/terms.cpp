@@ -11,9 +11,7 @@ void JacobianTerms::add_motion(JacobianBlocks& J, const double* lambda, int firs
   const Bodies& all = bodies.all();
   for (const auto& force : forces) force->add_jacobian(all, J);
   rows.each([&](const auto& row) {
-    const Inertia &ia = all.inertia[at(row.first)], &ib = all.inertia[at(row.second)];
-    const Frame<Dual> A = seed(all.frames[at(row.first)], ia.slot >= 0, 0);
-    const Frame<Dual> B = seed(all.frames[at(row.second)], ib.slot >= 0, kBodyDirections);
+    const auto [A, B] = seed_pair(all, row.first, row.second);
     Wrench<Dual> a = no_wrench<Dual>(), b = no_wrench<Dual>();
     row.pull(A, B, lambda + row.row, a, b);
     put_wrench(all, row.first, row.second, row.first, A, a, J);
@@ -35,9 +33,7 @@ void JacobianTerms::add_rows(JacobianBlocks& J, int first_row, const RowsInUse* 
                              double cj) const {
   const Bodies& all = bodies.all();
   rows.each([&](const auto& row) {
-    const Inertia &ia = all.inertia[at(row.first)], &ib = all.inertia[at(row.second)];
-    const Frame<Dual> A = seed(all.frames[at(row.first)], ia.slot >= 0, 0);
-    const Frame<Dual> B = seed(all.frames[at(row.second)], ib.slot >= 0, kBodyDirections);
+    const auto [A, B] = seed_pair(all, row.first, row.second);
     Dual g[3], rate[3];
     row.template rows<2>(A, B, g);
     if (in_use) row.template rows<1>(A, B, rate);
@@ -49,9 +45,8 @@ void JacobianTerms::add_rows(JacobianBlocks& J, int first_row, const RowsInUse* 
         d.segment<6>(18) += cj * rate[i].derivatives().template segment<6>(18);
       }
       const double factor = in_use && !in_use->carries_multiplier(row.row + i) ? 0.0 : 1.0;
-      if (ia.slot >= 0) J.add_directions(first_row + row.row + i, ia.slot, d, 0, factor);
-      if (ib.slot >= 0)
-        J.add_directions(first_row + row.row + i, ib.slot, d, kBodyDirections, factor);
+      J.add_body(first_row + row.row + i, all, row.first, d, 0, factor);
+      J.add_body(first_row + row.row + i, all, row.second, d, kBodyDirections, factor);
     }
   });
 }
@@ -93,11 +88,7 @@ void AccelerationJacobian::form() {
   const MovingBodies& bodies = terms_.bodies;
   const int m = terms_.rows.count();
   da_ = -left_.topRows(6 * bodies.count());  // M^-1 (-D)
-  for (int k = 0; k < bodies.count(); ++k) {
-    const Inertia& inertia = bodies.inertia(k);
-    da_.middleRows<3>(6 * k) /= inertia.mass;
-    da_.middleRows<3>(6 * k + 3) = (inertia.inverse * da_.middleRows<3>(6 * k + 3)).eval();
-  }
+  bodies.divide_by_mass(da_);
   if (m == 0) return;
   const JointGradient& gradient = dynamics_.gradient();
   dlambda_ = dynamics_.solve_rows(-left_.bottomRows(m) - gradient.G * da_);

@@ -8,6 +8,7 @@
 // the energy (u+ - u)' M (u+ - u) / 2 (Carnot).
 #include <tether/linalg/least_squares.hpp>
 
+#include "bounds.hpp"
 #include "joints/joint_type.hpp"
 #include "switching.hpp"
 
@@ -17,7 +18,6 @@ using namespace mechanics;
 
 namespace {
 
-constexpr double kDependentRow = 1e-10;  // of rows that are scaled to length 1
 constexpr double kContradiction = 1e-8;  // of the fastest speed
 
 /// At t = 0 without velocities, and in the states.

@@ -5,8 +5,8 @@
 // has radius 0), the second a plane, a point or a line of the second body. Each kind has
 //   touch(A, B)  gap, gap', gap'' (without accelerations where the frames have none), the normal n
 //                from second to first, the contact point p and its velocity
-// and an `inside(A, B)`: whether the second feature is the one that is nearest there; a plane may
-// be a face with a border.
+//   margin(A, B) how far the contact is inside the borders of both, m; < 0: others are nearer there
+// A plane may be a face with a border.
 //
 //   plane   gap = n.(c - b) - r                         n' = W_B x n
 //   point   gap = |d| - r - r_B,  d = c - b             gap'' = n.d'' + (|d'|^2 - gap'^2) / |d|
@@ -54,48 +54,76 @@ struct Touch {
   Vector3d point_velocity = Vector3d::Zero();  ///< of the contact point as it moves over the bodies
 };
 
-/// The half-space n.(x - b) <= 0 of the second body, or a face of it: where all border.x <= limit.
+inline Jet<double> way(const Jet<double>& from, const Jet<double>& to) {
+  return {to.x - from.x, to.x1 - from.x1, to.x2 - from.x2};
+}
+
+/// d without its part along the unit vector e.
+inline Jet<double> across(const Jet<double>& d, const Jet<double>& e) {
+  const double k = d.x.dot(e.x), k1 = d.x1.dot(e.x) + d.x.dot(e.x1),
+               k2 = d.x2.dot(e.x) + 2 * d.x1.dot(e.x1) + d.x.dot(e.x2);
+  return {d.x - k * e.x, d.x1 - k1 * e.x - k * e.x1, d.x2 - k2 * e.x - 2 * k1 * e.x1 - k * e.x2};
+}
+
+/// Gap, rates and normal of two round features whose middles are d apart. The point of contact is
+/// left to the caller.
+inline Touch apart(const Jet<double>& d, double radius_first, double radius) {
+  const double D = d.x.norm();
+  Touch t;
+  t.normal = d.x / D;
+  t.gap = D - radius_first - radius;
+  t.rate = t.normal.dot(d.x1);
+  t.second = t.normal.dot(d.x2) + (d.x1.squaredNorm() - t.rate * t.rate) / D;
+  t.normal_rate = (d.x1 - t.normal * t.rate) / D;
+  return t;
+}
+
+using scene::Knob;
+using scene::Round;
+using scene::Segment;
+
+/// The half-space n.(x - b) <= 0 of a body, or a face of it: where all border.x <= limit.
 struct PlaneFeature {
   Vector3d at = Vector3d::Zero(), normal = Vector3d::UnitZ();
   std::vector<std::pair<Vector3d, double>> border;  ///< in the axes of the body
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-              double radius) const {
-    const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
-    const Jet<double> n = direction<2>(B, normal);
-    const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
-    Touch t;
-    t.gap = n.x.dot(d) - radius;
-    t.rate = n.x1.dot(d) + n.x.dot(d1);
-    t.second = n.x2.dot(d) + 2 * n.x1.dot(d1) + n.x.dot(d2);
-    t.normal = n.x;
-    t.normal_rate = n.x1;
-    t.point = c.x - radius * n.x;
-    t.point_velocity = c.x1 - radius * n.x1;
-    return t;
-  }
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
+  /// How far a point in these axes is inside the border, m.
+  double margin(const Vector3d& local) const {
     double least = kInfinity;
-    if (border.empty()) return least;
-    const Vector3d local = point_in(B, mechanics::point<0>(A, centre).x);
     for (const auto& [outward, limit] : border) least = std::min(least, limit - outward.dot(local));
     return least;
   }
 };
 
-/// Gap, rates and normal of two round features whose middles are d = (d, d', d'') apart; `n1` gets
-/// the rate of the normal. The point of contact is left to the caller.
-inline Touch apart(const Vector3d& d, const Vector3d& d1, const Vector3d& d2, double radius_first,
-                   double radius, Vector3d& n1) {
-  const double D = d.norm();
-  Touch t;
-  t.normal = d / D;
-  t.gap = D - radius_first - radius;
-  t.rate = t.normal.dot(d1);
-  t.second = t.normal.dot(d2) + (d1.squaredNorm() - t.rate * t.rate) / D;
-  t.normal_rate = n1 = (d1 - t.normal * t.rate) / D;
-  return t;
-}
+/// A point of the first body with a radius, on a plane or face of the second one.
+struct PointOnPlane {
+  Knob first;
+  PlaneFeature plane;
+
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const {
+    const Jet<double> c = mechanics::point<2>(A, first.at), n = direction<2>(B, plane.normal);
+    const Jet<double> d = way(mechanics::point<2>(B, plane.at), c);
+    Touch t;
+    t.gap = n.x.dot(d.x) - first.radius;
+    t.rate = n.x1.dot(d.x) + n.x.dot(d.x1);
+    t.second = n.x2.dot(d.x) + 2 * n.x1.dot(d.x1) + n.x.dot(d.x2);
+    t.normal = n.x;
+    t.normal_rate = n.x1;
+    t.point = c.x - first.radius * n.x;
+    t.point_velocity = c.x1 - first.radius * n.x1;
+    return t;
+  }
+  /// A vertex touches a face whose normal no edge of it goes against. (That of a box which stands
+  /// flush on another one is on the border of the other's side faces, too: its edges go into them.)
+  double margin(const Frame<double>& A, const Frame<double>& B) const {
+    if (plane.border.empty()) return kInfinity;
+    double least = plane.margin(point_in(B, mechanics::point<0>(A, first.at).x));
+    const Vector3d normal = B.R * plane.normal;
+    for (const Vector3d& along : first.edges)
+      least = std::min(least, kFlush * along.norm() + normal.dot(A.R * along));
+    return least;
+  }
+};
 
 //   c = e x f, D = |c|, n = +- c / D, d = a - b        gap = n.d - r
 //   n' = (c' - D' n) / D,  D' = n.c'                   n'' = (c'' - D'' n - 2 D' n') / D
@@ -110,13 +138,11 @@ inline Touch apart(const Vector3d& d, const Vector3d& d1, const Vector3d& d2, do
 // long as its line goes on over the face: so arcs are longer by kFlush. (A face that turns about
 // the other edge is left by its own border: its corners and other edges touch by then.)
 
-using scene::Segment;
-
 struct CrossingFeature {
   Segment first, second;
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const;
+  double margin(const Frame<double>& A, const Frame<double>& B) const;
 
  private:
   /// Out of the second body, or from it to the first one.
@@ -128,12 +154,11 @@ struct CrossingFeature {
   static constexpr double kParallel = 1e-9;  // squared sine
 };
 
-inline Touch CrossingFeature::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                                    double) const {
+inline Touch CrossingFeature::touch(const Frame<double>& A, const Frame<double>& B) const {
   using mechanics::direction;
-  const Jet<double> a = mechanics::point<2>(A, first.at), b = mechanics::point<2>(B, second.at);
+  const Jet<double> a = mechanics::point<2>(A, first.at);
   const Jet<double> e = direction<2>(A, first.along), f = direction<2>(B, second.along);
-  const Vector3d d = a.x - b.x, d1 = a.x1 - b.x1, d2 = a.x2 - b.x2;
+  const auto [d, d1, d2] = way(mechanics::point<2>(B, second.at), a);
   Vector3d c = e.x.cross(f.x), c1 = e.x1.cross(f.x) + e.x.cross(f.x1),
            c2 = e.x2.cross(f.x) + 2 * e.x1.cross(f.x1) + e.x.cross(f.x2);
   Touch t;
@@ -162,8 +187,7 @@ inline Touch CrossingFeature::touch(const Frame<double>& A, const Frame<double>&
   return t;
 }
 
-inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double>& B,
-                                      const Vector3d&) const {
+inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double>& B) const {
   const Vector3d d = mechanics::point<0>(A, first.at).x - mechanics::point<0>(B, second.at).x;
   const Vector3d e = A.R * first.along, f = B.R * second.along, c = e.cross(f);
   const double square = c.squaredNorm();
@@ -184,8 +208,6 @@ inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double
 //   ds/dn                      the point that is that far
 //
 // and L' = W x L, L'' = alpha x L + W x L'.
-
-using scene::Round;
 
 /// Support function of a round body whose frame is known, for unit directions n; `_t`: its
 /// derivative by time with n fixed.
@@ -240,8 +262,8 @@ struct RoundOnPlane {
   PlaneFeature plane;
   double disc = 0;  ///< radius of its border, about plane.at; 0: none
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const;
+  double margin(const Frame<double>& A, const Frame<double>& B) const;
   /// A disc is flush with the plane: it touches in more points than one.
   bool is_flush(const Frame<double>& A, const Frame<double>& B) const {
     return first.is_disc() &&
@@ -256,8 +278,8 @@ struct RoundOnPlane {
 struct RoundOnRound {
   Round first, second;
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const;
+  double margin(const Frame<double>& A, const Frame<double>& B) const;
 };
 
 /// A round feature on a line of the second body, which has a radius.
@@ -265,72 +287,57 @@ struct RoundOnLine {
   Round first;
   Segment line;
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&, double) const;
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const;
+  double margin(const Frame<double>& A, const Frame<double>& B) const;
 };
 
 /// A sphere or point of the first body on the circle of a cylinder's end. (Where it comes over from
 /// the face the supports have a kink, the distance has none.)
 struct PointOnCircle {
+  Knob first;
   Vector3d at = Vector3d::Zero(), axis = Vector3d::UnitZ();  ///< out of the body
   double circle = 0;
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-              double radius) const;
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const;
+  double margin(const Frame<double>& A, const Frame<double>& B) const;
 };
 
-/// A point of the second body with a radius.
-struct PointFeature {
+/// Points of both bodies, with radii.
+struct PointOnPoint {
+  Knob first;
   Vector3d at = Vector3d::Zero();
   double radius = 0;
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-              double radius_first) const {
-    const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
-    const Vector3d d = c.x - b.x, d1 = c.x1 - b.x1, d2 = c.x2 - b.x2;
-    Vector3d n1;
-    Touch t = apart(d, d1, d2, radius_first, radius, n1);
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const {
+    const Jet<double> b = mechanics::point<2>(B, at);
+    Touch t = apart(way(b, mechanics::point<2>(A, first.at)), first.radius, radius);
     // Between the surfaces, by their radii: at a gap of 0 it is the point of contact.
     t.point = b.x + radius * t.normal;
-    t.point_velocity = b.x1 + radius * n1;
+    t.point_velocity = b.x1 + radius * t.normal_rate;
     return t;
   }
-  double margin(const Frame<double>&, const Frame<double>&, const Vector3d&) const {
-    return kInfinity;
+  double margin(const Frame<double>&, const Frame<double>&) const { return kInfinity; }
+};
+
+/// A point of the first body on a line of the second one, both with radii.
+struct PointOnLine {
+  Knob first;
+  Segment line;
+
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const {
+    const Jet<double> c = mechanics::point<2>(A, first.at), e = direction<2>(B, line.along);
+    Touch t = apart(across(way(mechanics::point<2>(B, line.at), c), e), first.radius, line.radius);
+    t.point = c.x - first.radius * t.normal;
+    t.point_velocity = c.x1 - first.radius * t.normal_rate;
+    return t;
+  }
+  double margin(const Frame<double>& A, const Frame<double>& B) const {
+    const Vector3d s = mechanics::point<0>(A, first.at).x - mechanics::point<0>(B, line.at).x;
+    const double k = s.dot(times(B.R, line.along));
+    return std::min(k, line.length - k);
   }
 };
 
-/// A line of the second body through `at` along `along`, with a radius; from 0 to `length` along
-/// it.
-struct LineFeature {
-  Vector3d at = Vector3d::Zero(), along = Vector3d::UnitX();
-  double length = 0, radius = 0;
-
-  Touch touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-              double radius_first) const {
-    const Jet<double> c = mechanics::point<2>(A, centre), b = mechanics::point<2>(B, at);
-    const Jet<double> e = direction<2>(B, along);
-    const Vector3d s = c.x - b.x, s1 = c.x1 - b.x1, s2 = c.x2 - b.x2;
-    // d = s - (s.e) e, which is at right angles to e.
-    const double k = s.dot(e.x), k1 = s1.dot(e.x) + s.dot(e.x1),
-                 k2 = s2.dot(e.x) + 2 * s1.dot(e.x1) + s.dot(e.x2);
-    const Vector3d d = s - k * e.x, d1 = s1 - k1 * e.x - k * e.x1,
-                   d2 = s2 - k2 * e.x - 2 * k1 * e.x1 - k * e.x2;
-    Vector3d n1;
-    Touch t = apart(d, d1, d2, radius_first, radius, n1);
-    t.point = c.x - radius_first * t.normal;
-    t.point_velocity = c.x1 - radius_first * n1;
-    return t;
-  }
-  double margin(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre) const {
-    const Vector3d s = mechanics::point<0>(A, centre).x - mechanics::point<0>(B, at).x;
-    const double k = s.dot(times(B.R, along));
-    return std::min(k, length - k);
-  }
-};
-
-/// One potential contact of a scene.
 /// Friction that depends on the direction: coefficients along and across an axis of a body, over
 /// the larger one.
 struct EllipticFriction {
@@ -339,25 +346,20 @@ struct EllipticFriction {
   double along = 1, across = 1;
 };
 
+/// One potential contact of a scene.
 struct FeaturePair {
   int first = 0, second = 0;  ///< bodies, as in Bodies
-  Vector3d centre = Vector3d::Zero();
-  double radius = 0;            ///< of the first feature, a point
-  std::vector<Vector3d> edges;  ///< of the first feature, a vertex: the ways to its neighbours
-  std::variant<PlaneFeature, PointFeature, LineFeature, CrossingFeature, RoundOnPlane, RoundOnRound,
+  std::variant<PointOnPlane, PointOnPoint, PointOnLine, CrossingFeature, RoundOnPlane, RoundOnRound,
                RoundOnLine, PointOnCircle>
-      on_second;
+      features;
   double friction = 0, restitution = 0;
   std::optional<EllipticFriction> elliptic;  ///< `friction` is the larger coefficient
   double rolling = 0, torsional = 0;         ///< m
   double reach = kInfinity;  ///< of both shapes from the centres of their bodies, together
 
   Touch touch(const Bodies& bodies) const {
-    return std::visit(
-        [&](const auto& feature) {
-          return feature.touch(bodies.frames[at(first)], bodies.frames[at(second)], centre, radius);
-        },
-        on_second);
+    const Frame<double>&A = bodies.frames[at(first)], &B = bodies.frames[at(second)];
+    return std::visit([&](const auto& pair) { return pair.touch(A, B); }, features);
   }
   bool is_apart(const Bodies& bodies, double by) const {
     const double most = reach + by;
@@ -369,26 +371,12 @@ struct FeaturePair {
   }
   /// It touches in more points than one contact can stand for.
   bool is_flush(const Bodies& bodies) const {
-    const auto* round = std::get_if<RoundOnPlane>(&on_second);
+    const auto* round = std::get_if<RoundOnPlane>(&features);
     return round != nullptr && round->is_flush(bodies.frames[at(first)], bodies.frames[at(second)]);
   }
   double margin(const Bodies& bodies) const {
     const Frame<double>&A = bodies.frames[at(first)], &B = bodies.frames[at(second)];
-    const double margin =
-        std::visit([&](const auto& feature) { return feature.margin(A, B, centre); }, on_second);
-    const auto* face = std::get_if<PlaneFeature>(&on_second);
-    if (face == nullptr || face->border.empty()) return margin;
-    return std::min(margin, out_of_face(B.R * face->normal, A));
-  }
-
- private:
-  /// A vertex touches a face whose normal no edge of it goes against. (That of a box which stands
-  /// flush on another one is on the border of the other's side faces, too: its edges go into them.)
-  double out_of_face(const Vector3d& normal, const Frame<double>& A) const {
-    double least = kInfinity;
-    for (const Vector3d& way : edges)
-      least = std::min(least, kFlush * way.norm() + normal.dot(A.R * way));
-    return least;
+    return std::visit([&](const auto& pair) { return pair.margin(A, B); }, features);
   }
 };
 

@@ -27,19 +27,20 @@ struct ContactKinematics {
 /// Newton's restitution and Coulomb's friction of one contact.
 struct ContactLaw {
   double friction = 0, restitution = 0;
-  /// >= 0: it has no gap and always this normal force: a motor or the friction of a joint, along
-  /// the first of the tangents. friction is 1 then.
-  double bound = -1;
-  /// >= 0: a moment without a gap, whose normal force is that of this contact, and friction a
-  /// length: of rolling, across the normal, along both tangents; `spin`: about it, along the first.
-  int held_by = -1;
-  bool spin = false;
-  bool conveys = false;  ///< one of its surfaces moves on its body
+  enum class Kind : unsigned char {
+    contact,
+    conveying,  ///< one of its surfaces moves on its body
+    bounded,    ///< without a gap: a motor or the friction of a joint, along the first tangent
+    rolling,    ///< a moment without a gap, across the normal of `held_by`, along both tangents
+    spinning    ///< the same about that normal, along the first tangent
+  } kind = Kind::contact;
+  double bound = 0;  ///< of a bounded one: always its normal force; friction is 1 then
+  int held_by = -1;  ///< of a moment: the contact whose normal force it has; friction is a length
 
-  bool is_bounded() const { return bound >= 0; }
-  bool is_moment() const { return held_by >= 0; }
-  bool has_normal() const { return !is_bounded() && !is_moment(); }
-  bool is_line() const { return is_bounded() || spin; }  ///< it has one tangent only
+  bool is_bounded() const { return kind == Kind::bounded; }
+  bool is_moment() const { return kind >= Kind::rolling; }
+  bool has_normal() const { return kind < Kind::bounded; }
+  bool is_line() const { return is_bounded() || kind == Kind::spinning; }  ///< one tangent only
 };
 
 /// The force of a bounded law that sticks, or the sign of that of one that slides; else 0.

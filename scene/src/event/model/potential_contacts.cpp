@@ -26,31 +26,23 @@ class Contacts {
     return other;
   }
 
-  template <class Feature>
-  void put(const Knob& knob, Feature feature) {
+  template <class Features>
+  void put(Features features) {
     out_.push_back(bodies_);
-    out_.back().centre = knob.at;
-    out_.back().radius = knob.radius;
-    out_.back().edges = knob.edges;
-    out_.back().on_second.emplace<Feature>(std::move(feature));
-  }
-
-  template <class Feature>
-  void put(Feature feature) {
-    put(Knob{}, std::move(feature));
+    out_.back().features = std::move(features);
   }
 
   /// Points of the first on faces and lines of the second. Sharp points and edges meet by chance
   /// only.
   void put_points(const Outline& a, const Outline& b) {
     for (const Knob& knob : a.knobs) {
-      for (const Face& face : b.faces) put(knob, plane_of(face));
+      for (const Face& face : b.faces) put(PointOnPlane{knob, plane_of(face)});
       for (const Segment& s : b.segments)
-        if (knob.radius + s.radius > 0) put(knob, LineFeature{s.at, s.along, s.length, s.radius});
+        if (knob.radius + s.radius > 0) put(PointOnLine{knob, s});
     }
   }
   void put_on_plane(const Outline& a, const PlaneFeature& plane) {
-    for (const Knob& knob : a.knobs) put(knob, plane);
+    for (const Knob& knob : a.knobs) put(PointOnPlane{knob, plane});
     for (const Round& round : a.rounds) put(RoundOnPlane{round, plane, 0});
   }
 
@@ -68,7 +60,7 @@ class Contacts {
         if (!round.is_disc()) put(RoundOnRound{point, round});
       if (knob.radius > 0)
         for (const End& end : b.ends)
-          put(knob, PointOnCircle{end.plane.at, end.plane.normal, end.radius});
+          put(PointOnCircle{knob, end.plane.at, end.plane.normal, end.radius});
     }
   }
   void put_rounds_on_each_other(const Outline& a, const Outline& b) {
@@ -78,14 +70,14 @@ class Contacts {
   void put_points_and_edges(const Outline& a, const Outline& b) {
     for (const Knob& knob : a.knobs)
       for (const Knob& other : b.knobs)
-        if (knob.radius + other.radius > 0) put(knob, PointFeature{other.at, other.radius});
+        if (knob.radius + other.radius > 0) put(PointOnPoint{knob, other.at, other.radius});
     // The sign of a normal is that of a sharp edge.
     for (const Segment& s : a.segments)
       for (const Segment& o : b.segments) {
         if (s.is_sharp() && !o.is_sharp())
-          swapped().put(Knob{}, CrossingFeature{o, s});
+          swapped().put(CrossingFeature{o, s});
         else
-          put(Knob{}, CrossingFeature{s, o});
+          put(CrossingFeature{s, o});
       }
   }
 

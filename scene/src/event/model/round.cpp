@@ -141,10 +141,6 @@ Touch touch_at(const Between& between, const Vector3d& n, const Jet<double>& d,
   return t;
 }
 
-Jet<double> way(const Jet<double>& from, const Jet<double>& to) {
-  return {to.x - from.x, to.x1 - from.x1, to.x2 - from.x2};
-}
-
 /// How far inside of the contacts of its circle a disc's is: on its face's side, away from the
 /// other one. `n` points to the disc's partner.
 double margin_of_disc(const Frame<double>& f, const Round& disc, const Vector3d& n) {
@@ -171,8 +167,7 @@ OnLine nearest(const RoundOnLine& pair, const Frame<double>& A, const Frame<doub
 
 }  // namespace
 
-Touch RoundOnPlane::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                          double) const {
+Touch RoundOnPlane::touch(const Frame<double>& A, const Frame<double>& B) const {
   const Jet<double> a = mechanics::point<2>(A, first.at), n = direction<2>(B, plane.normal);
   const Jet<double> d = way(mechanics::point<2>(B, plane.at), a);
   const Support::At s = Support(A, first).at(n.x);
@@ -188,7 +183,7 @@ Touch RoundOnPlane::touch(const Frame<double>& A, const Frame<double>& B, const 
   return t;
 }
 
-double RoundOnPlane::margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const {
+double RoundOnPlane::margin(const Frame<double>& A, const Frame<double>& B) const {
   if (plane.border.empty() && disc == 0) return kInfinity;
   const Vector3d n = times(B.R, plane.normal);
   const Vector3d centre = mechanics::point<0>(A, first.at).x - Support(A, first).at(n).point;
@@ -197,15 +192,13 @@ double RoundOnPlane::margin(const Frame<double>& A, const Frame<double>& B, cons
     const Vector3d d = point_in(B, centre) - plane.at;
     least = disc - (d - plane.normal.dot(d) * plane.normal).norm();
   }
-  for (const auto& [outward, limit] : plane.border)
-    least = std::min(least, limit - outward.dot(point_in(B, centre)));
+  least = std::min(least, plane.margin(point_in(B, centre)));
   if (first.is_disc())
     least = std::min(least, first.size() * (kFlush - n.dot(A.R * first.outward)));
   return least;
 }
 
-Touch RoundOnRound::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                          double) const {
+Touch RoundOnRound::touch(const Frame<double>& A, const Frame<double>& B) const {
   const Jet<double> a = mechanics::point<2>(A, first.at);
   const Jet<double> d = way(mechanics::point<2>(B, second.at), a);
   const Support s(A, first), t(B, second);
@@ -214,15 +207,13 @@ Touch RoundOnRound::touch(const Frame<double>& A, const Frame<double>& B, const 
   return touch_at(between, n, d, nullptr, Vector3d::Zero(), a);
 }
 
-double RoundOnRound::margin(const Frame<double>& A, const Frame<double>& B,
-                            const Vector3d& centre) const {
+double RoundOnRound::margin(const Frame<double>& A, const Frame<double>& B) const {
   if (!first.is_disc() && !second.is_disc()) return kInfinity;
-  const Vector3d n = touch(A, B, centre, 0).normal;
+  const Vector3d n = touch(A, B).normal;
   return std::min(margin_of_disc(A, first, -n), margin_of_disc(B, second, n));
 }
 
-Touch RoundOnLine::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d&,
-                         double) const {
+Touch RoundOnLine::touch(const Frame<double>& A, const Frame<double>& B) const {
   const OnLine on = nearest(*this, A, B);
   const Jet<double> a = mechanics::point<2>(A, first.at), e = direction<2>(B, line.along);
   const Jet<double> d = way(mechanics::point<2>(B, line.at + on.along * line.along), a);
@@ -231,7 +222,7 @@ Touch RoundOnLine::touch(const Frame<double>& A, const Frame<double>& B, const V
   return touch_at(between, on.n, d, &e.x, -e.x1.dot(on.n) * e.x, a);
 }
 
-double RoundOnLine::margin(const Frame<double>& A, const Frame<double>& B, const Vector3d&) const {
+double RoundOnLine::margin(const Frame<double>& A, const Frame<double>& B) const {
   const OnLine on = nearest(*this, A, B);
   double least = std::min({on.along, line.length - on.along, margin_of_disc(A, first, -on.n)});
   for (const Vector3d& inward : line.inward)
@@ -239,15 +230,11 @@ double RoundOnLine::margin(const Frame<double>& A, const Frame<double>& B, const
   return least;
 }
 
-Touch PointOnCircle::touch(const Frame<double>& A, const Frame<double>& B, const Vector3d& centre,
-                           double radius) const {
-  const Jet<double> c = mechanics::point<2>(A, centre), x = direction<2>(B, axis);
+Touch PointOnCircle::touch(const Frame<double>& A, const Frame<double>& B) const {
+  const Jet<double> c = mechanics::point<2>(A, first.at), x = direction<2>(B, axis);
   const Jet<double> b = mechanics::point<2>(B, at), d = way(b, c);
   // q = v / |v|, v = d without its part along the axis.
-  const double k = d.x.dot(x.x), k1 = d.x1.dot(x.x) + d.x.dot(x.x1),
-               k2 = d.x2.dot(x.x) + 2 * d.x1.dot(x.x1) + d.x.dot(x.x2);
-  const Vector3d v = d.x - k * x.x, v1 = d.x1 - k1 * x.x - k * x.x1,
-                 v2 = d.x2 - k2 * x.x - 2 * k1 * x.x1 - k * x.x2;
+  const auto [v, v1, v2] = across(d, x);
   const double D = v.norm();
   Touch t;
   if (!(D > 1e-9 * circle)) {  // on the axis, where it touches the face if anything
@@ -260,17 +247,15 @@ Touch PointOnCircle::touch(const Frame<double>& A, const Frame<double>& B, const
   const Vector3d q1 = (v1 - D1 * q) / D;
   const double D2 = q1.dot(v1) + q.dot(v2);
   const Vector3d q2 = (v2 - D2 * q - 2 * D1 * q1) / D;
-  Vector3d n1;
-  t = apart(d.x - circle * q, d.x1 - circle * q1, d.x2 - circle * q2, radius, 0, n1);
+  t = apart({d.x - circle * q, d.x1 - circle * q1, d.x2 - circle * q2}, first.radius, 0);
   t.point = b.x + circle * q;
   t.point_velocity = b.x1 + circle * q1;
   return t;
 }
 
-double PointOnCircle::margin(const Frame<double>& A, const Frame<double>& B,
-                             const Vector3d& centre) const {
+double PointOnCircle::margin(const Frame<double>& A, const Frame<double>& B) const {
   const Vector3d x = times(B.R, axis);
-  const Vector3d d = mechanics::point<0>(A, centre).x - mechanics::point<0>(B, at).x;
+  const Vector3d d = mechanics::point<0>(A, first.at).x - mechanics::point<0>(B, at).x;
   const double k = d.dot(x);
   return std::min(k, (d - k * x).norm() - circle);
 }

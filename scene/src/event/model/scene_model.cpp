@@ -8,72 +8,6 @@
 
 namespace tether::scene::event {
 
-LawContacts::LawContacts(const Scene& scene, const mechanics::Bodies& bodies)
-    : laws_(scene, bodies) {
-  contact::JointLaws all;
-  laws_.add(bodies, all);
-  for (int law = 0; law < all.count(); ++law) {
-    const contact::JointLaws::Law& from = all[law];
-    const bool rubs = laws_.slip(law) != nullptr;
-    if (from.is_sprung() || (!from.limit && !rubs && from.bound == 0)) continue;
-    Entry each{law, {}, 0, 0};
-    if (from.limit) {
-      each.of.restitution = from.restitution;
-      each.gap_at_zero = from.gap - laws_.sign(law) * laws_.value(law, bodies);
-    } else {
-      each.of.friction = 1;
-      each.of.bound = from.bound;
-      each.wanted = from.rate;
-    }
-    list_.push_back(each);
-  }
-}
-
-double LawContacts::gap(int k, const mechanics::Bodies& bodies, double& rate) const {
-  const Entry& each = at_place(k);
-  rate = 0;
-  if (each.of.is_bounded()) return 0;
-  const double sign = laws_.sign(each.law);
-  rate = sign * laws_.coordinate(each.law).rate(bodies);
-  return each.gap_at_zero + sign * laws_.value(each.law, bodies);
-}
-
-void LawContacts::evaluate_contact(int k, const mechanics::Bodies& bodies,
-                                   ContactKinematics& out) const {
-  const Entry& each = at_place(k);
-  const int velocities = 6 * bodies.moving;
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(velocities);
-  laws_.each_load(each.law, bodies, [&](int body, const mechanics::Wrench<double>& on) {
-    const int slot = bodies.inertia[mechanics::at(body)].slot;
-    const Eigen::Matrix3d& R = bodies.frames[mechanics::at(body)].R;
-    row.segment<3>(6 * slot) += on.force.transpose();
-    row.segment<3>(6 * slot + 3) += on.torque.transpose() * R;
-  });
-  const effects::CapstanSlip* slip = laws_.slip(each.law);
-  const double rest =
-      slip ? slip->rest(bodies) : laws_.sign(each.law) * laws_.coordinate(each.law).rest(bodies);
-  out.gap = gap(k, bodies, out.normal_rate);
-  out.normal.setZero(velocities);
-  out.tangents.setZero(2, velocities);
-  out.slip_rate.setZero(2);
-  out.slip_rest.setZero(2);
-  out.normal_rate = out.normal_rest = 0;
-  if (each.of.is_bounded()) {
-    out.tangents.row(0) = row;
-    out.slip_rate[0] = -each.wanted;
-    out.slip_rest[0] = rest;
-  } else {
-    out.normal = row;
-    out.normal_rest = rest;
-  }
-}
-
-Eigen::Vector3d LawContacts::direction(int k, const mechanics::Bodies& bodies) const {
-  const int law = at_place(k).law;
-  if (laws_.slip(law)) return Eigen::Vector3d::Zero();
-  return laws_.sign(law) * laws_.coordinate(law).direction(bodies);
-}
-
 namespace {
 
 using Row = Eigen::RowVectorXd;
@@ -142,8 +76,9 @@ VectorXd SceneModel::start() const {
 
 void SceneModel::add_moments() {
   for (int k = 0; k < pairs(); ++k) {
-    if (pair(k).rolling > 0) moments_.push_back({pair(k).rolling, 0, -1, k, false});
-    if (pair(k).torsional > 0) moments_.push_back({pair(k).torsional, 0, -1, k, true});
+    using Kind = ContactLaw::Kind;
+    if (pair(k).rolling > 0) moments_.push_back({pair(k).rolling, 0, Kind::rolling, 0, k});
+    if (pair(k).torsional > 0) moments_.push_back({pair(k).torsional, 0, Kind::spinning, 0, k});
   }
 }
 
@@ -165,12 +100,11 @@ void SceneModel::find_holding(const Scene& scene) {
 // The slips of cables are the last laws.
 void SceneModel::share_bounds(double loaded, const std::vector<LawForce>& forces,
                               std::vector<double>& bounds) const {
-  std::vector<effects::Grip> rings;
-  joint_laws().grip(bodies_.all(), rings);
-  const std::size_t first = at(first_moment()) - rings.size();
+  joint_laws().grip(bodies_.all(), rings_);
+  const std::size_t first = at(first_moment()) - rings_.size();
   bounds.resize(forces.size());
   effects::share_tensions(
-      rings, loaded, [&](std::size_t ring) { return forces[first + ring]; },
+      rings_, loaded, [&](std::size_t ring) { return forces[first + ring]; },
       [&](std::size_t ring, double bound) { bounds[first + ring] = bound; });
 }
 
@@ -193,11 +127,6 @@ void SceneModel::set(double t, const double* q, const double* u) {
   bodies_.set_time(t);
   bodies_.set_state(y_.data());
   bodies_.set_turns(y_.data());
-}
-
-double SceneModel::next_kink(double t) const {
-  const auto next = std::upper_bound(kinks_.begin(), kinks_.end(), t);
-  return next != kinks_.end() ? *next : kInfinity;
 }
 
 void SceneModel::settle() {
@@ -231,16 +160,10 @@ void SceneModel::rates(double* q_rate) const {
   }
 }
 
-void SceneModel::divide_by_mass(Eigen::Ref<MatrixXd> X) const {
-  for (int k = 0; k < bodies_.count(); ++k) {
-    const Inertia& inertia = bodies_.inertia(k);
-    X.middleRows<3>(6 * k) /= inertia.mass;
-    X.middleRows<3>(6 * k + 3) = (inertia.inverse * X.middleRows<3>(6 * k + 3)).eval();
-  }
-}
+void SceneModel::divide_by_mass(Eigen::Ref<MatrixXd> X) const { bodies_.divide_by_mass(X); }
 
 void SceneModel::forces(VectorXd& h) {
-  for (Load6& load : loads_) load.force = load.torque_body = load.torque_world = Vector3d::Zero();
+  clear(loads_);
   for (const auto& force : forces_) force->add(bodies_.all(), loads_);
   h.resize(velocities());
   for (int k = 0; k < bodies_.count(); ++k) {
@@ -371,8 +294,8 @@ void SceneModel::evaluate_moment(const ContactLaw& moment, ContactKinematics& ou
   const std::array<Vector3d, 2> t = tangents_of(moment.held_by, n);
   const Vector3d c1 = n1.cross(axes_[at(moment.held_by)]);
   const Vector3d first1 = (c1 - t[0] * t[0].dot(c1)) / n.cross(axes_[at(moment.held_by)]).norm();
-  const std::array<Vector3d, 2> along = {moment.spin ? n : t[0], t[1]};
-  const std::array<Vector3d, 2> turning = {moment.spin ? n1 : first1,
+  const std::array<Vector3d, 2> along = {moment.is_line() ? n : t[0], t[1]};
+  const std::array<Vector3d, 2> turning = {moment.is_line() ? n1 : first1,
                                            n1.cross(t[0]) + n.cross(first1)};
   const Vector3d spin = bodies.frames[at(p.first)].W - bodies.frames[at(p.second)].W;
   out.gap = out.normal_rate = out.normal_rest = 0;
@@ -380,7 +303,7 @@ void SceneModel::evaluate_moment(const ContactLaw& moment, ContactKinematics& ou
   out.tangents.setZero(2, velocities());
   out.slip_rate.setZero(2);
   out.slip_rest.setZero(2);
-  for (int k = 0; k < (moment.spin ? 1 : 2); ++k) {
+  for (int k = 0; k < (moment.is_line() ? 1 : 2); ++k) {
     for (const int body : {p.first, p.second}) {
       const int slot = bodies.inertia[at(body)].slot;
       if (slot < 0) continue;
@@ -399,7 +322,7 @@ std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& nor
 
 Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
-  const bool turns = is_moment(contact), spins = turns && moment(contact).spin;
+  const bool turns = is_moment(contact), spins = turns && moment(contact).is_line();
   if (turns) contact = moment(contact).held_by;
   const Touch touch = pair(contact).touch(bodies_.all());
   const Vector3d& normal = touch.normal;

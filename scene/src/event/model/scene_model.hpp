@@ -2,51 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "bounds.hpp"
+#include "effects/list.hpp"
 #include "features.hpp"
-#include "joints/coordinate.hpp"
 #include "joints/joint_rows.hpp"
+#include "law_contacts.hpp"
 #include "mechanics/force.hpp"
-#include "model.hpp"
 #include "smooth/rows/moving_bodies.hpp"
 
 namespace tether::scene::event {
-
-// A limit is a contact without friction: its gap is the way to it. A motor or the friction of a
-// joint is one without a gap that slides where its speed is not the wanted one, against the bound,
-// and sticks where it is, with any force up to the bound. In the parts of a contact (normal,
-// tangents) a limit has the first alone, a bounded law the second.
-
-class LawContacts {
- public:
-  /// `bodies`: at t = 0. Laws with a bound of 0 are none.
-  LawContacts(const Scene& scene, const mechanics::Bodies& bodies);
-
-  int count() const { return static_cast<int>(list_.size()); }
-  const joints::JointLaws& all() const { return laws_; }
-  int place(int k) const { return at_place(k).law; }  ///< in all()
-  /// Cables rub by their tension.
-  ContactLaw law(int k, const mechanics::Bodies& bodies) const {
-    ContactLaw of = at_place(k).of;
-    if (const auto* slip = laws_.slip(place(k))) of.bound = slip->grip(bodies).bound();
-    return of;
-  }
-  double gap(int k, const mechanics::Bodies& bodies, double& rate) const;
-  void evaluate_contact(int k, const mechanics::Bodies& bodies, ContactKinematics& out) const;
-  /// Zero of a cable.
-  Eigen::Vector3d direction(int k, const mechanics::Bodies& bodies) const;
-
- private:
-  struct Entry {
-    int law;
-    ContactLaw of;
-    double gap_at_zero, wanted;  // of the coordinate; a speed
-  };
-  const Entry& at_place(int k) const { return list_[static_cast<std::size_t>(k)]; }
-
-  joints::JointLaws laws_;
-  std::vector<Entry> list_;
-};
 
 /// Coordinates: x and q (wxyz) of each moving body, by slot. Velocities: v in world axes and w in
 /// body axes.
@@ -71,9 +34,10 @@ class SceneModel final : public Model {
   ContactLaw law(int contact) const override {
     if (is_law(contact)) return laws_.law(contact - pairs(), bodies_.all());
     if (is_moment(contact)) return moment(contact);
-    ContactLaw law{pair(contact).friction, pair(contact).restitution};
-    law.conveys = conveys(pair(contact).first) || conveys(pair(contact).second);
-    return law;
+    const FeaturePair& p = pair(contact);
+    const bool conveying = conveys(p.first) || conveys(p.second);
+    return {p.friction, p.restitution,
+            conveying ? ContactLaw::Kind::conveying : ContactLaw::Kind::contact};
   }
 
   double holding(int contact) const override {
@@ -87,7 +51,7 @@ class SceneModel final : public Model {
                     std::vector<double>& bounds) const override;
 
   void set(double t, const double* q, const double* u) override;
-  double next_kink(double t) const override;
+  double next_kink(double t) const override { return effects::next_kink(kinks_, t); }
   void begin_anew(double t) override { bodies_.begin_anew(t); }
   void settle() override;
   int axis(int contact) const override;
@@ -186,6 +150,7 @@ class SceneModel final : public Model {
   std::vector<std::optional<SurfaceSpeed>> surface_;  // by body, of Bodies; empty: none
   std::vector<std::string> body_names_, joint_names_, spring_names_;
   LawContacts laws_;
+  mutable std::vector<effects::Grip> rings_;  // workspace
   std::vector<ContactLaw> moments_;
   std::vector<Vector3d> axes_;  // next to which the tangents of each contact are chosen
   std::vector<double> y_;       // of MovingBodies

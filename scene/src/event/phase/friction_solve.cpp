@@ -18,8 +18,7 @@ namespace {
 constexpr double kLocked = 1e-12;  // A_nn of the largest
 constexpr double kSolve = 1e-12, kNear = 1e-8;
 constexpr double kFarAbove = 1e5;
-constexpr int kMostRounds = 100;         // of bounds that follow forces, which contract
-constexpr double kSettledBound = 1e-13;  // of the largest
+constexpr int kMostRounds = 100;  // of bounds that follow forces, which contract
 constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
 
 /// The cones of a problem, and their rows in it. Those without a bound, and those of contacts that
@@ -373,7 +372,7 @@ bool ContactRows::share_bounds(const FrictionSolution& answer,
     change = std::max(change, std::abs(bound - std::exchange(parts_[k].bound, bound)));
     largest = std::max(largest, bound);
   }
-  return change > kSettledBound * largest;
+  return change > kSolve * largest;
 }
 
 // Bounded laws and moments about axes that joints hold do nothing: what is left of their mobility

@@ -8,8 +8,6 @@
 
 namespace tether::scene::event {
 
-constexpr double kDependentRow = 1e-10;  // of rows of unit length
-
 /// K = S R M^-1 C S of rows R and columns C, S a diagonal. Rows of bodies that no row connects do
 /// not meet in it: each such island has factors of its own.
 class RowIslands {

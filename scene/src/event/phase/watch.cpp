@@ -10,7 +10,6 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr int kMostIterations = 80;
 constexpr int kPolish = 3;
 constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
@@ -34,7 +33,7 @@ double zero_between(const F& f, double a, double fa, double b, double fb, double
 template <class F>
 double kink_between(const F& f, double a, double b, double fb, double near, double resolution) {
   double m = 0.5 * (a + b);
-  for (int k = 0; k < kMostIterations && b - a > resolution && fb < -2 * near; ++k) {
+  for (int k = 0; k < mechanics::kMostIterations && b - a > resolution && fb < -2 * near; ++k) {
     const double fm = f(m);
     if (fm >= 0) {
       a = m;

@@ -85,6 +85,13 @@ void MovingBodies::read(const double* y, std::vector<BodyState>& out) const {
   }
 }
 
+void MovingBodies::divide_by_mass(Eigen::Ref<Eigen::MatrixXd> X) const {
+  for (int k = 0; k < count(); ++k) {
+    X.middleRows<3>(6 * k) /= inertia(k).mass;
+    X.middleRows<3>(6 * k + 3) = (inertia(k).inverse * X.middleRows<3>(6 * k + 3)).eval();
+  }
+}
+
 double MovingBodies::kinetic_energy() const {
   double sum = 0;
   for (int k = 0; k < count(); ++k) {

@@ -31,6 +31,8 @@ class MovingBodies {
   void set_turns(const double* y);           ///< for derivatives by quaternions
   void read(const double* y, std::vector<BodyState>& out) const;
 
+  /// X <- M^-1 X, 6 rows a body: velocity, angular velocity in its axes.
+  void divide_by_mass(Eigen::Ref<Eigen::MatrixXd> X) const;
   double kinetic_energy() const;
   Vector3d momentum() const;
   Vector3d angular_momentum() const;  ///< about the origin

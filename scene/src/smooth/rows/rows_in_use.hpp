@@ -18,8 +18,6 @@ struct JointGradient {
   void form(const JointRows& rows, const MovingBodies& bodies);
 };
 
-using joints::JointRows;
-
 /// C = G M^-1/2 with G as in JointGradient, by its entries: six for each row and body.
 class SparseJointGradient {
  public:
