@@ -77,6 +77,29 @@ RigidAssembly rigid_stack(int n, double ratio, double mu) {
   return out;
 }
 
+RigidAssembly moving_stack(int n, int heavy, Generator& g) {
+  RigidAssembly out;
+  const Eigen::Vector3d h(g.uniform(0.15, 1), g.uniform(0.3, 1), g.uniform(0.2, 0.6));
+  const double speed = std::pow(10, g.uniform(-4, -1.5)), mu = g.uniform(0.2, 0.9);
+  const Eigen::Vector3d square = h.cwiseProduct(h);
+  for (int k = 0; k < n; ++k) {
+    RigidBody b;
+    b.inverse_mass = (k + heavy) % 2 ? 1e-6 : 1;
+    const Eigen::Vector3d inverse(3 / (square.y() + square.z()), 3 / (square.x() + square.z()),
+                                  3 / (square.x() + square.y()));
+    b.inverse_inertia = (b.inverse_mass * inverse).asDiagonal();
+    b.velocity = speed * g.vector() - 9.81e-3 * Eigen::Vector3d::UnitZ();
+    b.angular_velocity = speed * g.vector();
+    out.bodies.push_back(b);
+    const double aside_x = g.uniform(-0.1, 0.1), aside_y = g.uniform(-0.1, 0.1);
+    for (double x : {-0.9, 0.9})
+      for (double y : {-0.9, 0.9})
+        out.touch(k, k - 1, {x * h.x(), y * h.y(), -h.z()},
+                  {(x + aside_x) * h.x(), (y + aside_y) * h.y(), k > 0 ? h.z() : 0}, {0, 0, 1}, mu);
+  }
+  return out;
+}
+
 Assembly cluster(Generator& g, double mu, int bodies, int contacts) {
   Assembly out;
   for (int k = 0; k < bodies; ++k) {

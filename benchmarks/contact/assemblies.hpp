@@ -36,6 +36,10 @@ struct RigidAssembly {
 // stack() for BodySolver; contacts have ids 0, 1, ...
 RigidAssembly rigid_stack(int n, double ratio, double mu = 0.5);
 
+// Boxes that lie on each other a little aside, each with a velocity and a spin of its own, every
+// other one a million times as heavy: boxes 0, 2, ... if heavy = 1, else 1, 3, ...
+RigidAssembly moving_stack(int n, int heavy, Generator& g);
+
 // Five bodies with random inertia, twelve random contacts.
 Assembly cluster(Generator& g, double mu, int bodies = 5, int contacts = 12);
 

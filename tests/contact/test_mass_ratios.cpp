@@ -4,7 +4,7 @@
 #include <tether/contact.hpp>
 #include <vector>
 
-#include "random_contacts.hpp"
+#include "assemblies.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::contact;
@@ -250,41 +250,6 @@ TEST_CASE("mass ratios: what round-off keeps from being solved ends soon and say
 
 namespace {
 
-// Boxes that lie on each other a little aside, each with a velocity and a spin of its own; 1 : 1e6.
-Stack moving_stack(int n, int heavy, std::uint64_t seed) {
-  random::Generator g(seed);
-  Stack s;
-  const Vector3d h(g.uniform(0.15, 1), g.uniform(0.3, 1), g.uniform(0.2, 0.6));
-  const double speed = std::pow(10, g.uniform(-4, -1.5)), mu = g.uniform(0.2, 0.9);
-  const Vector3d square = h.cwiseProduct(h);
-  for (int k = 0; k < n; ++k) {
-    RigidBody b;
-    b.inverse_mass = (k + heavy) % 2 ? 1e-6 : 1;
-    const Vector3d inverse(3 / (square.y() + square.z()), 3 / (square.x() + square.z()),
-                           3 / (square.x() + square.y()));
-    b.inverse_inertia = (b.inverse_mass * inverse).asDiagonal();
-    b.velocity = speed * g.vector() - 9.81e-3 * Vector3d::UnitZ();
-    b.angular_velocity = speed * g.vector();
-    s.bodies.push_back(b);
-    const double aside_x = g.uniform(-0.1, 0.1), aside_y = g.uniform(-0.1, 0.1);
-    for (double x : {-0.9, 0.9})
-      for (double y : {-0.9, 0.9}) {
-        PointContact c;
-        c.first = k;
-        c.second = k - 1;
-        c.r1 = {x * h.x(), y * h.y(), -h.z()};
-        c.r2 = {(x + aside_x) * h.x(), (y + aside_y) * h.y(), k > 0 ? h.z() : 0};
-        c.mu = mu;
-        s.contacts.push_back(c);
-      }
-  }
-  return s;
-}
-
-}  // namespace
-
-namespace {
-
 struct MovingCase {
   int boxes, heavy;
   std::uint64_t seed;
@@ -295,7 +260,8 @@ double solve_moving(const std::vector<MovingCase>& cases, int most_unsolved = 1)
   int unsolved = 0;
   double work = 0;
   for (const MovingCase& c : cases) {
-    const Problem p = moving_stack(c.boxes, c.heavy, c.seed).problem();
+    random::Generator g(c.seed);
+    const Problem p = random::moving_stack(c.boxes, c.heavy, g).problem();
     Options o;
     o.law = Law::coulomb;
     o.tolerance = 1e-6;

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <random>
+#include <set>
 
 #include "joints/body_cones.hpp"
+#include "joints/cone_islands.hpp"
 #include "stepping_scenes.hpp"
 #include "support/catch.hpp"
 
@@ -265,6 +267,26 @@ TEST_CASE("rolling: a stepper that is given the memory of another goes on by its
   for (std::size_t i = 0; i < whole.contact_moments().size(); ++i)
     CHECK(whole.contact_moments()[i] == part.contact_moments()[i]);
   for (int i = 0; i < whole.bodies().size(); ++i) CHECK(velocity(whole, i) == velocity(part, i));
+}
+
+TEST_CASE(
+    "rolling: impulses, moments and laws of 16 million surfaces have identities of their own") {
+  std::set<std::uint64_t> ids = {tc::PointContact::kNoId};
+  std::size_t expected = 1;
+  const int surfaces[] = {0, 1, 2, 0x3fffff, 0x400000, 0x400001, 0x800000, 0x800001, 0xffffff};
+  for (const int first : surfaces)
+    for (const int second : surfaces)
+      for (const int feature : {0, 1, 0xffff}) {
+        if (first >= second) continue;
+        const std::uint64_t id = tc::contact_id(first, second, feature);
+        ids.insert({id, tc::detail::moment_id(id)});
+        expected += 2;
+      }
+  for (const int law : {0, 1, 2, 0xffff, 0x10000, 0x10001, 0x7fffffff}) {
+    ids.insert(tc::detail::LawRows::id(law));
+    ++expected;
+  }
+  CHECK(ids.size() == expected);
 }
 
 TEST_CASE("rolling: what it does not go with is refused by name") {

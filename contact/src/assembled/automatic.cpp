@@ -34,58 +34,40 @@ bool is_regular(const System& system) {
 
 }  // namespace
 
-void Automatic::reset(int contacts, const Options& options, bool proofs) {
+void Automatic::reset(int contacts, const Options& options) {
   contacts_ = contacts;
   options_ = options;
-  proofs_ = proofs;
-  proof_.clear();
-  ready_ = sought_proof_ = false;
+  proof_.reset();
 }
 
-void Automatic::prepare() {
-  if (ready_) return;
-  sweeps_.reset(contacts_);
-  newton_.reset(contacts_);
-  interior_.reset(contacts_);
-  parts_.reset(contacts_);
-  ready_ = true;
-}
-
-// All stages start from the best point, but sweeps and the proximal path from the last sweep.
+// All stages start from the best point, but sweeps and the proximal path from the last sweep. Where
+// the slip is not differentiable at some contact only sweeps and proximal Newton serve.
 Status Automatic::rotate(Search& search, int most_idle) {
-  constexpr int kFactorisations = 800;  // of the path by its arclength
-  constexpr int kProblems = 12;         // of proximal Newton
-  prepare();
+  constexpr int kProblems = 12;  // of proximal Newton
+  sweeps_.reset(contacts_);
+  matrix_.reset(contacts_);
+  newton_.reset(contacts_);
+  interior_.reset(search.system);
+  parts_.reset(contacts_);
   sweeps_.start(search.best.data());
   const bool regular = is_regular(search.system);
-  if (!interior_.ordered()) find_bodies(search);
-  if (search.confirmed()) return Status::solved;
-  if (search.exhausted()) return Status::work_limit;
-  const bool by_bodies = regular && interior_.order_bodies(search);
+  find_bodies(search);
+  const bool by_bodies = regular && matrix_.order_by_bodies(search);
   double halved = search.best_error;
-  bool first = true, solved = false, expensive = false, rounding = false;
-  const auto turn = [&](bool due, const auto& stage) {
-    if (solved || rounding || !due) return;
-    stage();
-    solved = search.confirmed();
-  };
-  for (int idle = 0;; first = false) {
-    turn(true, [&] { expensive = sweep(search, first, by_bodies); });
+  bool first = true;
+  for (int idle = 0; !search.confirmed() && !search.exhausted(); first = false) {
+    const bool expensive = sweep(search, first, by_bodies);
+    if (search.confirmed() || search.exhausted()) break;
     const double swept = search.best_error;
-    if (!solved && search.exhausted()) return Status::work_limit;
-    turn(regular && expensive, [&] { proximal_path(search); });
-    turn(regular && !expensive && first, [&] { interior_points(search, by_bodies); });
-    turn(true, [&] { rounding = at_round_off(search); });
-    turn(regular && !expensive && first && !by_bodies, [&] { proximal_path_at_best(search); });
-    turn(regular && first, [&] { interior_.run_arclength(search, kFactorisations, newton_); });
-    turn(true, [&] { rounding = at_round_off(search); });
-    if (solved) return Status::solved;
-    if (!rounding && search.exhausted()) return Status::work_limit;
+    if (regular && expensive) proximal_path(search);
+    if (regular && !expensive && first) interior_points(search, by_bodies);
+    const bool rounding = !search.confirmed() && at_round_off(search);
+    if (regular && first && !rounding) arclength_path(search, expensive || by_bodies);
+    if (search.confirmed() || (search.exhausted() && !rounding)) break;
     if (infeasible(search)) return Status::infeasible;
     if (rounding) return Status::round_off;
-    turn(true, [&] { newton_.run(search, search.best.data(), kProblems); });
-    if (solved) return Status::solved;
-    if (search.exhausted()) return Status::work_limit;
+    newton_.run(search, search.best.data(), kProblems);
+    if (search.confirmed() || search.exhausted()) break;
     // Sweeps start anew where the others have gained.
     if (search.best_error < 0.9 * swept) sweeps_.start(search.best.data());
     const bool gains = !(search.best_error > 0.5 * halved);
@@ -93,9 +75,11 @@ Status Automatic::rotate(Search& search, int most_idle) {
     idle = gains ? 0 : idle + 1;
     if (idle >= most_idle) return give_up(search);
   }
+  return search.solved() ? Status::solved : Status::work_limit;
 }
 
 Status Automatic::run_part(Search& search, const Packed& start) {
+  proof_.emplace();
   search.test(start.data(), By::sweeps);
   return search.solved() ? Status::solved : rotate(search, kMostIdleRoundsBefore);
 }
@@ -126,7 +110,6 @@ Status Automatic::run(Search& search) {
     x_ = search.best;
     search.best_error = std::numeric_limits<double>::infinity();
     search.test(x_.data(), By::sweeps);
-    ready_ = false;
     status = search.solved() ? Status::solved
                              : rotate(search, eccentricity == kCoupled ? kMostIdleRounds
                                                                        : kMostIdleRoundsBefore);
@@ -158,7 +141,7 @@ bool Automatic::order_after_sweeps(Search& search) {
   leave.least_work = kBeforeOrdering * price;
   sweeps_.run(search, leave);
   if (search.solved() || search.exhausted()) return false;
-  interior_.order(search);
+  matrix_.order(search);
   return true;
 }
 
@@ -201,7 +184,7 @@ bool Automatic::sweep(Search& search, bool first, bool by_bodies) {
   constexpr double kStay = 3, kStayByBodies = 5, kStayIfExpensive = 40,
                    kLeaveBeyond = 20;  // factorisations
   const double begin = search.counts.work;
-  if (first && !interior_.ordered() && !order_after_sweeps(search)) return false;
+  if (first && !by_bodies && !order_after_sweeps(search)) return false;
   const double price = interior_.cost(search);
   const bool expensive = !by_bodies && price > kExpensive * search.sweep_cost;
   const double until = begin + (by_bodies   ? kStayByBodies
@@ -247,6 +230,12 @@ void Automatic::proximal_path_at_best(Search& search) {
   x_ = search.best;
   const bool loaded = search.system.load(x_.data()) > kOrdinaryLoad;
   interior_.run_proximal(search, x_.data(), loaded ? kMost : kProblems, newton_, loaded);
+}
+
+void Automatic::arclength_path(Search& search, bool at_once) {
+  constexpr int kFactorisations = 800;
+  if (!at_once && !search.confirmed()) proximal_path_at_best(search);
+  if (!search.confirmed()) interior_.run_arclength(search, kFactorisations, newton_);
 }
 
 // With large mass ratios the products x.u of separating contacts and of contacts under heavy bodies
@@ -299,28 +288,21 @@ void Automatic::proximal_path_from_small(Search& search) {
 
 // The proof is sought once in a solve, after the quick stages have failed.
 bool Automatic::infeasible(Search& search) {
-  if (proofs_ && !sought_proof_) {
-    sought_proof_ = true;
-    if (!proves_infeasible(search, proof_)) proof_.clear();
-  }
-  return !proof_.empty();
+  if (!proof_ && !proves_infeasible(search, proof_.emplace())) proof_->clear();
+  return !proof_->empty();
 }
 
 // Whether the error is the round-off of A x - b: its bound explains the error, and steps with long
-// sums gain nothing. On stacks with large mass ratios they end within kUnits of that bound. Steps
-// that stall above it, near the point, are followed by steps from further away.
+// sums gain nothing. On stacks with large mass ratios they end within kUnits of that bound.
 bool Automatic::at_round_off(Search& search) {
-  constexpr int kSteps = 8;
   constexpr double kUnits = 4, kNearly = 100;
   while (search.explained_by_round_off() && !search.solved()) {
     const double before = search.best_error;
     const auto stuck = [&] { return search.best_error > kGain * before; };
-    prepare();
-    interior_.run_near(search, search.best.data(), kSteps);
-    const bool near = search.best_error < kNearly * search.options.tolerance;
-    if (stuck() && near && search.best_error > kUnits * search.system.rounding(search.best.data()))
+    const bool near = before < kNearly * search.options.tolerance;
+    if (near && before > kUnits * search.system.rounding(search.best.data()))
       follow_to_the_end(search);
-    if (stuck() && near) proximal_path_from_small(search);
+    if (near && stuck()) proximal_path_from_small(search);
     if (stuck()) return true;
     if (search.exhausted()) return false;
   }

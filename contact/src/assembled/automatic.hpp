@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "assembled/search/search.hpp"
 #include "assembled/stages/accelerated_sweeps.hpp"
@@ -48,18 +49,19 @@ bool proves_infeasible(Search& search, Packed& d);
 // The order of the methods (method, section 10).
 class Automatic {
  public:
-  // Called before a solve; keeps the storage. proofs: whether to seek a proof of infeasibility.
-  void reset(int contacts, const Options& options, bool proofs = true);
+  Automatic() = default;
+  Automatic(const Automatic&) = delete;
+  // Called before a solve; keeps the storage.
+  void reset(int contacts, const Options& options);
   // Solves from search.best, which one sweep did not solve.
   Status run(Search& search);
-  // A part of a larger problem, from `start`: the stages without replacements of the law.
+  // A part of a larger problem, from `start`: without replacements of the law and proofs.
   Status run_part(Search& search, const Packed& start);
 
   // The normal impulses that prove infeasibility; empty: none are known.
-  const Packed& proof() const { return proof_; }
+  Packed proof() const { return proof_.value_or(Packed()); }
 
  private:
-  void prepare();
   Status rotate(Search& search, int most_idle);
   bool sweep(Search& search, bool first, bool by_bodies);
   void find_bodies(Search& search);
@@ -68,6 +70,7 @@ class Automatic {
   void proximal_path(Search& search);
   void interior_points(Search& search, bool by_bodies);
   void proximal_path_at_best(Search& search);
+  void arclength_path(Search& search, bool at_once);
   void solve_parts_of_end(Search& search);
   void follow_to_the_end(Search& search);
   void proximal_path_from_small(Search& search);
@@ -77,12 +80,13 @@ class Automatic {
 
   Options options_;
   AcceleratedSweeps sweeps_;
-  ProximalNewton newton_;
-  InteriorPoint interior_;
+  NewtonMatrix matrix_;
+  ProximalNewton newton_{matrix_};
+  InteriorPoint interior_{matrix_};
   LocalSolves parts_, end_parts_;
-  Packed x_, z_, proof_;
+  Packed x_, z_;
+  std::optional<Packed> proof_;  // none: not sought in this solve
   int contacts_ = 0;
-  bool ready_ = false, proofs_ = true, sought_proof_ = false;
 };
 
 }  // namespace tether::contact::detail

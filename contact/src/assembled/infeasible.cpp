@@ -87,7 +87,9 @@ bool proves_infeasible(Search& search, Packed& d) {
   // A search that has spent its work may spend a little more: a proof is worth it.
   smooth.work_end = std::max(search.work_end - search.counts.work,
                              std::min(40 * search.sweep_cost * kSteps, kBeyond * options.max_work));
-  ProximalNewton newton;
+  NewtonMatrix matrix;
+  matrix.reset(problem.contacts());
+  ProximalNewton newton(matrix);
   newton.reset(problem.contacts());
   Packed anchor(n), point(n), w(n);
   double tau = 1e-2;

@@ -149,7 +149,7 @@ bool LocalSolves::solve_part(Search& search, int part, double budget, Packed& x)
   local.system.belong_to(system, contacts);
   local.system.share_as(system, contacts);
   local.system.to_own_units(start.data());
-  part_->automatic.reset(m, options, false);
+  part_->automatic.reset(m, options);
   const bool solved = part_->automatic.run_part(local, start) == Status::solved;
   search.counts.add(local.counts);
   if (!solved) return false;

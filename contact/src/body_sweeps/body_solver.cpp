@@ -81,7 +81,6 @@ void BodySolver::Implementation::solve(const std::vector<RigidBody>& b,
                 detail::groups_are_served());
     solve_graph();
   }
-  if (options.warm_start) memory.keep(c, o.impulses);
 }
 
 void BodySolver::Implementation::solve_graph() {
@@ -211,6 +210,7 @@ BodySolution BodySolver::solve(const std::vector<RigidBody>& bodies,
 void BodySolver::solve(const std::vector<RigidBody>& bodies,
                        const std::vector<PointContact>& contacts, BodySolution& solution) {
   implementation_->solve(bodies, contacts, solution);
+  implementation_->keep(contacts, solution.impulses);
 }
 
 std::vector<ContactRows> to_contacts(const std::vector<PointContact>& contacts) {

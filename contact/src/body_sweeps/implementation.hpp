@@ -136,8 +136,11 @@ struct BodySolver::Implementation {
   BodySolution* out = nullptr;                // the caller's
   detail::SweepPartners* partners = nullptr;  // other processes: RankTeam
 
-  // A solve, from body_solver.cpp on.
+  // A solve, from body_solver.cpp on. Starts from the memory, which the caller renews by keep().
   void solve(const std::vector<RigidBody>& b, const std::vector<PointContact>& c, BodySolution& o);
+  void keep(const std::vector<PointContact>& c, const std::vector<Vector3d>& impulses) {
+    if (options.warm_start) memory.keep(c, impulses);
+  }
   void find_starts();
   void solve_graph();  // given, starts and graph are known
   void solve_islands(int threads);

@@ -6,6 +6,8 @@
 #include <array>
 #include <tether/linalg/index.hpp>
 
+#include "body_sweeps/implementation.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
@@ -13,11 +15,6 @@ using Eigen::Vector3d;
 using linalg::at;
 
 namespace {
-
-// Identity of a contact's moment in warm starts; contact_id leaves this bit free.
-constexpr std::uint64_t moment_id(std::uint64_t contact) {
-  return contact | std::uint64_t{1} << 62;
-}
 
 // The same for a problem that is assembled.
 Options solver_options(const BodyOptions& options) {
@@ -43,13 +40,12 @@ Vector3d in_circle(const std::array<Vector3d, 2>& tangents, const Vector3d& norm
 
 ConeIslands::ConeIslands(Mechanisms& mechanisms, LawRows* laws, LawUse use,
                          const BodyOptions& options, const NearContacts* near,
-                         std::vector<Vector3d>* moments)
+                         std::vector<Vector3d>& moments)
     : mechanisms_(mechanisms),
       laws_(laws),
       use_(use),
       near_(near),
-      moments_(moments != nullptr ? *moments : own_),
-      warm_(options.warm_start),
+      moments_(use == LawUse::all ? moments : own_),
       solver_(solver_options(options)) {}
 
 void ConeIslands::set_options(const BodyOptions& options) {
@@ -79,10 +75,10 @@ void ConeIslands::find_islands(const std::vector<PointContact>& contacts) {
     (is_mine_[root(contacts[k])] != 0 ? mine_ : rest_).push_back(static_cast<int>(k));
 }
 
-void ConeIslands::add_contacts(const std::vector<PointContact>& contacts) {
-  memory_.rewind();
+void ConeIslands::add_contacts(const std::vector<PointContact>& contacts, ImpulseHistory& memory) {
+  memory.rewind();
   const auto last = [&](std::uint64_t id) {
-    const Vector3d* found = warm_ ? memory_.find(id) : nullptr;
+    const Vector3d* found = memory.find(id);
     return found != nullptr ? *found : Vector3d(Vector3d::Zero());
   };
   for (const int k : mine_) {
@@ -104,12 +100,12 @@ void ConeIslands::add_contacts(const std::vector<PointContact>& contacts) {
   }
 }
 
-void ConeIslands::add_laws() {
+void ConeIslands::add_laws(ImpulseHistory& memory) {
   for (int k = 0; k < laws_->laws.count(); ++k) {
     if (!laws_->in(use_, k)) continue;
     law_of_.push_back(k);
     cones_.push_back(laws_->cone(k, use_));
-    start_of_.push_back(laws_->start(k, warm_ ? memory_.find(laws_->id(k)) : nullptr));
+    start_of_.push_back(laws_->start(k, memory.find(LawRows::id(k))));
   }
 }
 
@@ -169,46 +165,38 @@ void ConeIslands::solve(BodySolver& others, const std::vector<RigidBody>& bodies
   start_of_.clear();
   if (near_ != nullptr) moments_.assign(contacts.size(), Vector3d::Zero());
   const bool laws = laws_ != nullptr && laws_->any(use_);
-  if (mine_.empty() && !laws) {
-    others.solve(bodies, contacts, out);
-    return remember(others, contacts, out);
-  }
+  if (mine_.empty() && !laws) return others.solve(bodies, contacts, out);
   points_.clear();
   for (const int k : rest_) points_.push_back(contacts[at(k)]);
-  others.solve(bodies, points_, solution_);
+  BodySolver::Implementation& rest = *others.implementation_;
+  rest.solve(bodies, points_, solution_);
   v_.clear();
   for (const RigidBody& body : bodies) v_.push_back(body.velocities());
-  add_contacts(contacts);
-  if (laws) add_laws();
+  add_contacts(contacts, rest.memory);
+  if (laws) add_laws(rest.memory);
   x_ = Eigen::Map<const Eigen::VectorXd>(start_of_.data(),
                                          static_cast<Eigen::Index>(start_of_.size()));
   result_ = solver_.solve(mechanisms_, cones_, v_, x_);
   take_laws();
   merge(bodies, contacts, out);
-  remember(others, contacts, out);
+  rest.keep(contacts, out.impulses);
+  if (rest.options.warm_start) remember_cones(contacts, rest.memory);
 }
 
-// Keeps the impulses of all contacts here and in the other solver. In the next solve a contact may
-// be in an island of the other kind, and saved states contain one memory.
-void ConeIslands::remember(BodySolver& others, const std::vector<PointContact>& contacts,
-                           const BodySolution& out) {
-  memory_.keep(contacts, out.impulses);
+void ConeIslands::remember_cones(const std::vector<PointContact>& contacts,
+                                 ImpulseHistory& memory) const {
   const Eigen::Index first = x_.size() - static_cast<Eigen::Index>(law_of_.size());
   for (std::size_t l = 0; l < law_of_.size(); ++l)
-    memory_.add(laws_->id(law_of_[l]), {x_[first + static_cast<Eigen::Index>(l)], 0, 0});
+    memory.add(LawRows::id(law_of_[l]), {x_[first + static_cast<Eigen::Index>(l)], 0, 0});
   if (near_ != nullptr)
     for (std::size_t k = 0; k < contacts.size(); ++k)
-      if (!moments_[k].isZero(0)) memory_.add(moment_id(contacts[k].id), moments_[k]);
-  memory_.get(start_);
-  others.set_warm_start(start_);
+      if (!moments_[k].isZero(0)) memory.add(moment_id(contacts[k].id), moments_[k]);
 }
 
-// Position corrections have no friction. The islands made first are those of the velocity solve,
-// whose moments are reported; later ones serve impacts and the closing of gaps.
+// Position corrections have no friction.
 std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions& options, LawUse laws) {
   if (laws == LawUse::limits) return nullptr;
-  return std::make_unique<ConeIslands>(mechanisms_, nullptr, laws, options, &near_,
-                                       std::exchange(first_, false) ? &moments : nullptr);
+  return std::make_unique<ConeIslands>(mechanisms_, nullptr, laws, options, &near_, moments);
 }
 
 }  // namespace tether::contact::detail

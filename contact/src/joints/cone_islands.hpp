@@ -5,7 +5,6 @@
 #include <tether/linalg/disjoint_sets.hpp>
 #include <vector>
 
-#include "body_sweeps/impulse_memory.hpp"
 #include "joints/body_cones.hpp"
 #include "joints/law_rows.hpp"
 #include "joints/mechanisms.hpp"
@@ -13,22 +12,28 @@
 
 namespace tether::contact::detail {
 
+/// Identity of a contact's moment in warm starts: that of the contact with its surfaces exchanged,
+/// an order that no contact of them has.
+constexpr std::uint64_t moment_id(std::uint64_t contact) {
+  return contact_id(static_cast<int>(contact >> 16 & 0xffffff), static_cast<int>(contact >> 40),
+                    static_cast<int>(contact & 0xffff));
+}
+
 /// Solves islands that have a mechanism, or contacts with rolling, torsional or elliptic friction.
+class ImpulseHistory;
+
 class ConeIslands final : public JointIslands {
  public:
   /// The mechanisms belong to the joints of the stepper, which update them; without joints `laws`
   /// is null. near: meetings whose contacts hold moments or have elliptic friction; null: none.
-  /// moments: receives the moments of all contacts of a solve, world axes, N m s; may be null.
+  /// moments: receives the moments of all contacts of a solve of a step's velocities, world axes,
+  /// N m s.
   ConeIslands(Mechanisms& mechanisms, LawRows* laws, LawUse use, const BodyOptions& options,
-              const NearContacts* near, std::vector<Eigen::Vector3d>* moments);
+              const NearContacts* near, std::vector<Eigen::Vector3d>& moments);
 
   void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
              const std::vector<PointContact>& contacts, BodySolution& out) override;
   void set_options(const BodyOptions& options) override;
-  void scale_warm_start(double factor) override { memory_.scale(factor); }
-  void take_back() override { memory_.take_back(); }
-  void forget() override { memory_.forget(); }
-  void set_warm_start(const WarmStart& start) override { memory_.set(start); }
 
  private:
   bool rolls(const PointContact& c) const { return near_ != nullptr && near_->meeting(c).rolls(); }
@@ -36,20 +41,18 @@ class ConeIslands final : public JointIslands {
     return near_ != nullptr && near_->meeting(c).is_elliptic();
   }
   void find_islands(const std::vector<PointContact>& contacts);
-  void add_contacts(const std::vector<PointContact>& contacts);
-  void add_laws();
+  void add_contacts(const std::vector<PointContact>& contacts, ImpulseHistory& memory);
+  void add_laws(ImpulseHistory& memory);
   void take_laws();
   void merge(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& out);
-  void remember(BodySolver& others, const std::vector<PointContact>& contacts,
-                const BodySolution& out);
+  void remember_cones(const std::vector<PointContact>& contacts, ImpulseHistory& memory) const;
 
   Mechanisms& mechanisms_;
   LawRows* laws_;
   LawUse use_;
   const NearContacts* near_;
   std::vector<Eigen::Vector3d> own_, &moments_;
-  bool warm_;
   BodyCones solver_;
   BodyCones::Result result_;
   linalg::DisjointSets sets_;
@@ -62,8 +65,6 @@ class ConeIslands final : public JointIslands {
   linalg::VectorX x_;
   std::vector<double> start_of_;  // x_ while cones are added
   std::vector<Vector6d> v_;
-  ImpulseHistory memory_;
-  WarmStart start_;
 };
 
 /// Rolling and elliptic friction in steps without joints; `near` must outlive it.
@@ -76,7 +77,6 @@ class RollingPart final : public IslandMaker {
  private:
   const NearContacts& near_;
   Mechanisms mechanisms_;  // none
-  bool first_ = true;
 };
 
 }  // namespace tether::contact::detail

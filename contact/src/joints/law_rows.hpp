@@ -33,7 +33,8 @@ class LawRows {
            (use == LawUse::limits && laws[law].limit);
   }
   bool any(LawUse use) const { return active && use != LawUse::none && laws.count() > 0; }
-  std::uint64_t id(int law) const { return kFirstId + static_cast<std::uint64_t>(law); }
+  /// Identity in warm starts: one of a contact of a surface with itself, which there is not.
+  static std::uint64_t id(int law) { return contact_id(law >> 16, law >> 16, law & 0xffff); }
   /// The cone of a law; with LawUse::limits for a correction of positions.
   BodyCone cone(int law, LawUse use) const;
   /// Starting impulse from that of the last step; null: there is none.
@@ -42,7 +43,6 @@ class LawRows {
   LawState state(int law, const std::vector<Vector6d>& v) const;
 
  private:
-  static constexpr std::uint64_t kFirstId = std::uint64_t{1} << 63;
   int at_bound(int law) const;
   int moving_along(int law) const;
   double speed(int law, const std::vector<Vector6d>& v) const;

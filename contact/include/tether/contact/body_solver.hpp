@@ -36,6 +36,10 @@ struct PointContact {
 
 class SolverTeam;
 
+namespace detail {
+class ConeIslands;
+}  // namespace detail
+
 /// Settings of BodySolver; illegal values throw where it is made.
 struct BodyOptions {
   Law law = Law::maximum_dissipation;  ///< of every contact
@@ -115,6 +119,7 @@ class SolverTeam {
 /// Not for use by two threads at once.
 class BodySolver {
   friend class RankTeam;
+  friend class detail::ConeIslands;
 
  public:
   explicit BodySolver(const BodyOptions& options = {});  ///< throws std::invalid_argument

@@ -209,7 +209,8 @@ struct StepContacts {
   std::vector<Eigen::Vector3d> moments;
 };
 
-/// Identity of a contact: surfaces (ascending) and feature.
+/// Identity of a contact: its surfaces, of 24 bits each and in one order for each pair, and the
+/// feature, of 16 bits.
 constexpr std::uint64_t contact_id(int first_surface, int second_surface, int feature) {
   return (static_cast<std::uint64_t>(first_surface) << 40) |
          (static_cast<std::uint64_t>(second_surface) << 16) | static_cast<std::uint64_t>(feature);

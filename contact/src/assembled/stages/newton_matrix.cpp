@@ -44,6 +44,14 @@ TETHER_CLONES void add_contact(const PackedBlock* H, const PackedBlock* turned, 
   }
 }
 
+// out = L A R
+TETHER_CLONES void enclose(const PackedBlock& L, const PackedBlock& A, const PackedBlock& R,
+                           PackedBlock& out) {
+  PackedBlock right;
+  multiply(A, R, right);
+  multiply(L, right, out);
+}
+
 }  // namespace
 
 void BodyNewton::order(const BodyForm& form) {
@@ -142,16 +150,33 @@ namespace {
 
 constexpr double kClearly = 0.5;  // of the price by contacts: the digits cost refinements
 constexpr double kOrderBodies = 500, kOrderContacts = 100;  // ns a contact, a block
+constexpr double kStepSweeps = 3;                           // of a step besides its factors
+
+bool is_zero(const PackedBlock& block) {
+  return std::all_of(block.column, block.column + 12, [](double v) { return v == 0; });
+}
 
 }  // namespace
 
+PackedBlock own_block(const LocalBlock& L, double factor) {
+  PackedBlock out;
+  const double rows[3][3] = {
+      {L.a, L.c[0], L.c[1]}, {L.c[0], L.T[0], L.T[1]}, {L.c[1], L.T[1], L.T[2]}};
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r) out.column[4 * c + r] = factor * rows[r][c];
+  return out;
+}
+
+double NewtonMatrix::cost_by_contacts(const Search& search, double operations) const {
+  return 4 * operations + kStepSweeps * search.sweep_cost +
+         25.0 * static_cast<double>(search.system.problem().blocks().size());
+}
+
 double NewtonMatrix::cost(const Search& search) const {
-  if (by_bodies()) return bodies_.cost() + sweeps_ * search.sweep_cost;
+  if (by_bodies()) return bodies_.cost() + kStepSweeps * search.sweep_cost;
   const double blocks = static_cast<double>(search.system.problem().blocks().size());
-  const double operations =
-      ordered() ? lu_.operations() : blocks * blocks / std::max(1, search.system.size());
-  return 4 * operations + sweeps_ * search.sweep_cost + 25 * blocks +
-         per_contact_ * search.system.size();
+  return cost_by_contacts(
+      search, ordered() ? operations_ : blocks * blocks / std::max(1, search.system.size()));
 }
 
 bool NewtonMatrix::order_by_bodies(Search& search) {
@@ -159,7 +184,7 @@ bool NewtonMatrix::order_by_bodies(Search& search) {
   const BodyForm* given = search.system.body_form();
   if (given == nullptr || 2 * given->contacts() < kContactsOfBody * given->nodes) return false;
   bodies_.order(*given);
-  if (!(bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * cost(search))) return false;
+  if (!(bodies_.cost() + kStepSweeps * search.sweep_cost < kClearly * cost(search))) return false;
   search.counts.work += kOrderBodies * search.system.size();
   form_ = Form::bodies;
   return true;
@@ -169,24 +194,84 @@ void NewtonMatrix::order(Search& search) {
   // Four contacts a body cost a quarter in equations of bodies, 2.8 as much as in those of
   // contacts.
   constexpr int kSome = 3;  // contacts for two nodes
-  if (ordered()) return;
-  order_for_parts(search);
-  if (by_bodies()) return;
+  if (ordered() || order_by_bodies(search)) return;
+  const linalg::BlockPattern pattern = detail::pattern(search.system.problem());
   search.counts.work +=
       kOrderContacts * static_cast<double>(search.system.problem().blocks().size());
-  lu_.analyse(pattern(search.system.problem()), nullptr);
+  lu_.order(pattern);
+  lu_.analyse(pattern, nullptr);
+  operations_ = lu_.operations();
+  form_ = Form::contacts;
   const BodyForm* given = search.system.body_form();
   if (given == nullptr || 2 * given->contacts() < kSome * given->nodes) return;
   const double by_contacts = cost(search);
   search.counts.work += kOrderBodies * search.system.size();
   bodies_.order(*given);
-  if (bodies_.cost() + sweeps_ * search.sweep_cost < kClearly * by_contacts) form_ = Form::bodies;
+  if (bodies_.cost() + kStepSweeps * search.sweep_cost < kClearly * by_contacts)
+    form_ = Form::bodies;
 }
 
-void NewtonMatrix::order_for_parts(Search& search) {
-  if (ordered() || order_by_bodies(search)) return;
-  lu_.order(pattern(search.system.problem()));
-  form_ = Form::contacts;
+bool NewtonMatrix::factor(Search& search, double u) {
+  order(search);
+  problem_ = &search.system.problem();
+  const bool regular = by_bodies() ? factor_bodies(u) : factor_contacts(u);
+  ++search.counts.factorisations;
+  search.counts.work += by_bodies() ? cost(search) : cost_by_contacts(search, lu_.operations());
+  return regular;
+}
+
+bool NewtonMatrix::factor_bodies(double u) {
+  bodies_.begin();
+  for (int i = 0; i < problem_->contacts(); ++i) {
+    const ContactBlocks& c = blocks_[at(i)];
+    PackedBlock D;
+    enclose(c.L, c.a, c.R, D);
+    for (int k = 0; k < 3; ++k) D.column[5 * k] += u;
+    bodies_.add(i, D, c.L, c.R);
+  }
+  return bodies_.factor();
+}
+
+bool NewtonMatrix::factor_contacts(double u) {
+  const Problem& p = *problem_;
+  coupled_.clear();
+  for (const ContactBlocks& c : blocks_) coupled_.push_back(!is_zero(c.L));
+  lu_.analyse(pattern(p), coupled_.data());
+  for (int row = 0; row < lu_.size(); ++row) {
+    const int i = lu_.block_row(row);
+    lu_.begin_row(row);
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const int j = p.columns()[at(k)];
+      if (!coupled_[at(j)]) continue;
+      PackedBlock A = p.blocks()[at(k)], block;
+      if (i == j)
+        for (int e = 0; e < 12; ++e) A.column[e] += blocks_[at(i)].a.column[e];
+      enclose(blocks_[at(i)].L, A, blocks_[at(j)].R, block);
+      if (i == j)
+        for (int c = 0; c < 3; ++c) block.column[5 * c] += u;
+      lu_.add(j, block.column);
+    }
+    if (!lu_.end_row()) return false;
+  }
+  return true;
+}
+
+void NewtonMatrix::solve(PackedVector* x) {
+  if (by_bodies()) return bodies_.solve(x);
+  const Problem& p = *problem_;
+  for (int row = 0; row < lu_.size() && lu_.size() < p.contacts(); ++row) {
+    const int i = lu_.block_row(row);
+    alignas(32) double known[4] = {0, 0, 0, 0};  // A R x of the others
+    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
+      const int j = p.columns()[at(k)];
+      if (coupled_[at(j)]) continue;
+      alignas(32) double Rx[4] = {0, 0, 0, 0};
+      apply(blocks_[at(j)].R, x[j].v, Rx, 1);
+      apply(p.blocks()[at(k)], Rx, known, 1);
+    }
+    apply(blocks_[at(i)].L, known, x[i].v, -1);
+  }
+  lu_.solve(x);
 }
 
 }  // namespace tether::contact::detail

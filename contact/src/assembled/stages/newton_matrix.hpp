@@ -45,17 +45,28 @@ class BodyNewton {
   Packed p_;
 };
 
-/// Chooses between equations of contacts and equations of bodies, orders them, and knows what a
-/// step costs. The steps write the values: by_bodies() says where.
+inline double mean_diagonal(const LocalBlock& L) { return (L.a + L.T[0] + L.T[2]) / 3; }
+
+/// factor times the symmetric part of a contact's own block of A.
+PackedBlock own_block(const LocalBlock& L, double factor);
+
+/// The blocks of u + L (A + a) R at one contact.
+struct ContactBlocks {
+  PackedBlock a, L, R;
+};
+
+/// u + L (A + a) R, u = 0 or 1, by equations of contacts, without those that have L = 0, or of
+/// bodies; knows what a step with it costs.
 class NewtonMatrix {
  public:
-  /// Costs of a step besides its factorisation: sweeps, and ns for each contact.
-  NewtonMatrix(double sweeps, double per_contact) : sweeps_(sweeps), per_contact_(per_contact) {}
-
-  void reset() { form_ = Form::none; }
+  void reset(int contacts) {
+    form_ = Form::none;
+    blocks_.resize(at(contacts));
+  }
   bool ordered() const { return form_ != Form::none; }
   bool by_bodies() const { return form_ == Form::bodies; }
-  /// Estimated ns of a step; by a guess of the fill before the matrix is ordered.
+  /// Estimated ns of a factorisation of all contacts and a few solutions; by a guess of the fill
+  /// before the matrix is ordered.
   double cost(const Search& search) const;
 
   /// True, and ordered, where bodies have so many contacts that a guess of the fill by contacts
@@ -63,22 +74,28 @@ class NewtonMatrix {
   bool order_by_bodies(Search& search);
   /// By what costs less, with the fill of both known.
   void order(Search& search);
-  /// By bodies where the guess says so, else by contacts, which are analysed for each step.
-  void order_for_parts(Search& search);
 
-  linalg::BlockLu& contacts() { return lu_; }
-  BodyNewton& bodies() { return bodies_; }
+  ContactBlocks& operator[](int contact) { return blocks_[at(contact)]; }
+  /// Counts its work, too. False: singular.
+  bool factor(Search& search, double u = 1);
   /// Sign of the matrix's determinant, or of one with the same sign where its blocks D have a
   /// positive determinant.
   int determinant_sign() const {
     return by_bodies() ? bodies_.determinant_sign() : lu_.determinant_sign();
   }
-  void solve(PackedVector* x) { by_bodies() ? bodies_.solve(x) : lu_.solve(x); }
+  void solve(PackedVector* x);
 
  private:
-  double sweeps_, per_contact_;
+  bool factor_bodies(double u);
+  bool factor_contacts(double u);
+  double cost_by_contacts(const Search& search, double operations) const;
+
+  double operations_ = 0;  // by contacts, with all of them
   enum class Form { none, contacts, bodies } form_ = Form::none;
-  linalg::BlockLu lu_;
+  const Problem* problem_ = nullptr;  // of the factors
+  std::vector<ContactBlocks> blocks_;
+  std::vector<char> coupled_;  // contacts with L != 0
+  BlockLu lu_;
   BodyNewton bodies_;
 };
 

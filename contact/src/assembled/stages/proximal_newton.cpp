@@ -7,19 +7,6 @@
 #include <limits>
 
 namespace tether::contact::detail {
-namespace {
-
-// out = P B for row-major P and packed B.
-TETHER_INLINE void multiply(const double* P, const double* B, double scale, double* out) {
-  for (int c = 0; c < 3; ++c) {
-    for (int r = 0; r < 3; ++r)
-      out[4 * c + r] =
-          scale * (P[3 * r] * B[4 * c] + P[3 * r + 1] * B[4 * c + 1] + P[3 * r + 2] * B[4 * c + 2]);
-    out[4 * c + 3] = 0;
-  }
-}
-
-}  // namespace
 
 void ProximalNewton::reset(int contacts) {
   n_ = contacts;
@@ -27,8 +14,6 @@ void ProximalNewton::reset(int contacts) {
     p->resize(at(n_));
   regimes_.resize(at(n_));
   derivatives_.resize(at(n_));
-  active_.resize(at(n_));
-  matrix_.reset();
 }
 
 double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
@@ -38,75 +23,26 @@ double ProximalNewton::residual(Search& search, const Packed& x, Packed& z,
                               derive ? derivatives_.data() : nullptr);
 }
 
-// F + dx + Phi'/(1+tau) sum_{j != i} A_ij dx_j = 0 with F = x - z.
+// dx + Phi'/(1+tau) (A - D) dx = -F with F = x - z and the diagonal blocks D: dx = -F where a
+// contact is separated, since Phi' = 0 there.
 bool ProximalNewton::direction(Search& search, double tau) {
-  matrix_.order_for_parts(search);
-  for (int i = 0; i < n_; ++i)
+  for (int i = 0; i < n_; ++i) {
+    ContactBlocks& blocks = matrix_[i];
+    blocks = {};
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r)
+        blocks.L.column[4 * c + r] = derivatives_[at(i)].d[3 * r + c] / (1 + tau);
+      blocks.R.column[5 * c] = 1;
+    }
+    blocks.a = own_block(search.system.problem().local(i), -1);
     for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
-  const double scale = 1 / (1 + tau);
-  const bool regular = matrix_.by_bodies() ? direction_by_bodies(search.system.problem(), scale)
-                                           : direction_by_contacts(search.system.problem(), scale);
-  ++search.counts.factorisations;
-  search.counts.work += cost(search);
-  if (!regular) return false;
+  }
+  if (!matrix_.factor(search)) return false;
+  matrix_.solve(dx_.data());
   double sum = 0;
   for (int i = 0; i < n_; ++i)
     for (int c = 0; c < 3; ++c) sum += dx_[at(i)].v[c] * dx_[at(i)].v[c];
   return std::isfinite(sum);
-}
-
-// Separated contacts are known: dx = -F there.
-bool ProximalNewton::direction_by_contacts(const Problem& p, double scale) {
-  BlockLu& lu = matrix_.contacts();
-  for (int i = 0; i < n_; ++i) active_[at(i)] = regimes_[at(i)] != Regime::separating;
-  lu.analyse(pattern(p), active_.data());
-  bool regular = true;
-  for (int r = 0; r < lu.size(); ++r) {
-    const int i = lu.block_row(r);
-    const double* P = derivatives_[at(i)].d;
-    double rhs[3] = {0, 0, 0};
-    lu.begin_row(r);
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      const int j = p.columns()[at(k)];
-      const double* A = p.blocks()[at(k)].column;
-      if (active_[at(j)]) {
-        alignas(32) double block[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-        if (j != i) multiply(P, A, scale, block);
-        lu.add(j, block);
-      } else {
-        const double* d = dx_[at(j)].v;
-        for (int c = 0; c < 3; ++c) rhs[c] += A[c] * d[0] + A[4 + c] * d[1] + A[8 + c] * d[2];
-      }
-    }
-    regular = lu.end_row() && regular;
-    for (int c = 0; c < 3; ++c)
-      dx_[at(i)].v[c] -=
-          scale * (P[3 * c] * rhs[0] + P[3 * c + 1] * rhs[1] + P[3 * c + 2] * rhs[2]);
-  }
-  if (regular) lu.solve(dx_.data());
-  return regular;
-}
-
-// (D + L A) dx = -F, L = Phi'/(1+tau) and D = 1 - L A_ii
-bool ProximalNewton::direction_by_bodies(const Problem& p, double scale) {
-  PackedBlock unit, left, D;
-  for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
-  matrix_.bodies().begin();
-  for (int i = 0; i < n_; ++i) {
-    const double* P = derivatives_[at(i)].d;
-    const LocalBlock& L = p.local(i);
-    const double block[12] = {L.a,    L.c[0], L.c[1], 0,      L.c[0], L.T[0],
-                              L.T[1], 0,      L.c[1], L.T[1], L.T[2], 0};
-    multiply(P, block, -scale, D.column);
-    for (int c = 0; c < 3; ++c) {
-      D.column[5 * c] += 1;
-      for (int r = 0; r < 3; ++r) left.column[4 * c + r] = scale * P[3 * r + c];
-    }
-    matrix_.bodies().add(i, D, left, unit);
-  }
-  if (!matrix_.bodies().factor()) return false;
-  matrix_.bodies().solve(dx_.data());
-  return true;
 }
 
 int ProximalNewton::inner(Search& search, double tau) {

@@ -13,6 +13,7 @@ namespace tether::contact::detail {
 // part left out, or by bodies where these have so many contacts that it costs less.
 class ProximalNewton {
  public:
+  explicit ProximalNewton(NewtonMatrix& matrix) : matrix_(matrix) {}
   void reset(int contacts);
   // From x; at most `most` outer steps. The result is search.best.
   void run(Search& search, const PackedVector* x, int most);
@@ -30,17 +31,14 @@ class ProximalNewton {
   // Solves the proximal problem at tau from x_ in place; Newton steps used, or -1.
   int inner(Search& search, double tau);
   bool direction(Search& search, double tau);
-  bool direction_by_contacts(const Problem& p, double scale);
-  bool direction_by_bodies(const Problem& p, double scale);
   double residual(Search& search, const Packed& x, Packed& z, const Proximal& proximal,
                   bool derive);
 
   int n_ = 0;
-  NewtonMatrix matrix_{3.5, 0};
+  NewtonMatrix& matrix_;
   Packed x_, z_, dx_, trial_, trial_z_, swept_, swept_z_, anchor_;
   std::vector<Regime> regimes_;
   std::vector<LocalDerivative> derivatives_;
-  std::vector<char> active_;
 };
 
 }  // namespace tether::contact::detail

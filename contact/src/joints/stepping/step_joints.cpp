@@ -59,10 +59,8 @@ bool StepJoints::are_joined(int first, int second) const {
 
 // As RollingPart::make_islands.
 std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options, LawUse laws) {
-  const bool rolls = near_ != nullptr && laws != LawUse::limits;
-  return std::make_unique<ConeIslands>(
-      mechanisms_, &laws_, laws, options, rolls ? near_ : nullptr,
-      rolls && std::exchange(first_islands_, false) ? &moments : nullptr);
+  return std::make_unique<ConeIslands>(mechanisms_, &laws_, laws, options,
+                                       laws != LawUse::limits ? near_ : nullptr, moments);
 }
 
 void StepJoints::list_laws(std::vector<LawState>& out) const {

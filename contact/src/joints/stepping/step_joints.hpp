@@ -26,10 +26,7 @@ class StepJoints final : public JointPart {
   bool holds(int body) const override { return mechanisms_.mechanism_of(body) >= 0; }
   bool are_joined(int first, int second) const override;
   std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
-  void set_rolling(const NearContacts& near) override {
-    near_ = &near;
-    first_islands_ = true;
-  }
+  void set_rolling(const NearContacts& near) override { near_ = &near; }
 
   void begin(BodySet& bodies, double t) override;
   bool predict(BodySet& bodies, double t, double dt) override;
@@ -101,7 +98,6 @@ class StepJoints final : public JointPart {
   Mechanisms mechanisms_;
   LawRows laws_;
   const NearContacts* near_ = nullptr;  // only where a meeting names rolling friction
-  bool first_islands_ = true;
   JointRows rows_;
   std::vector<int> bodies_of_rows_;  // of the first rows; -1 behind each
   int laws_in_step_ = -1;            // of the first step

@@ -39,15 +39,12 @@ struct LawState {
 class JointIslands {
  public:
   virtual ~JointIslands() = default;
-  /// As BodySolver::solve, which `others` is, for all islands that no joint takes part in. Joints
-  /// keep the velocities that they have: v+ - v satisfies G (v+ - v) = 0.
+  /// As BodySolver::solve, which `others` is, for all islands that no joint takes part in. Its
+  /// memory has the impulses of all contacts. Joints keep the velocities that they have: v+ - v
+  /// satisfies G (v+ - v) = 0.
   virtual void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
                      const std::vector<PointContact>& contacts, BodySolution& out) = 0;
   virtual void set_options(const BodyOptions& options) = 0;
-  virtual void scale_warm_start(double factor) = 0;
-  virtual void take_back() = 0;
-  virtual void forget() = 0;
-  virtual void set_warm_start(const WarmStart& start) = 0;
 };
 
 /// Who has contact problems of its own, and bodies that it connects.
@@ -136,24 +133,12 @@ class StepSolver {
     solver_.set_options(options);
     if (joints_) joints_->set_options(options);
   }
-  void scale_warm_start(double factor) {
-    solver_.scale_warm_start(factor);
-    if (joints_) joints_->scale_warm_start(factor);
-  }
-  void take_back() {
-    solver_.take_back();
-    if (joints_) joints_->take_back();
-  }
-  void forget() {
-    solver_.forget();
-    if (joints_) joints_->forget();
-  }
+  void scale_warm_start(double factor) { solver_.scale_warm_start(factor); }
+  void take_back() { solver_.take_back(); }
+  void forget() { solver_.forget(); }
   /// Impulses of all contacts.
   WarmStart warm_start() const { return solver_.warm_start(); }
-  void set_warm_start(const WarmStart& start) {
-    solver_.set_warm_start(start);
-    if (joints_) joints_->set_warm_start(start);
-  }
+  void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
 
  private:
   BodySolver solver_;

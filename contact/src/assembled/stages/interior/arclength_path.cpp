@@ -202,7 +202,7 @@ struct InteriorPoint::ArclengthPath {
 
   void evaluate() {
     pairs.set(own.point_);
-    own.equations_.evaluate(search.system, own.point_);
+    own.equations_.evaluate(search, own.point_);
   }
 
   // Newton's direction to the curve, at the present nu or across the tangent, and the tangent.
@@ -311,10 +311,9 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
   constexpr double kShift = 1e-11, kNear = 1, kFar = 1e5, kFarther = 100;
   constexpr double kTested = 1e-5, kEnd = 1e-24;  // of the first nu
   constexpr double kTry = 1e-6, kGain = 0.1;
-  constexpr int kFirstProblems = 3, kLastProblems = 30;
+  constexpr int kProblems = 3;  // of proximal Newton, where the curve is near a solution
   const int end = search.counts.factorisations + most;
   equations_.set_tau(0);
-  equations_.set_exact(false);
   newton_.set_shift(kShift);
   ArclengthPath path(*this, search);
   double first = 0;
@@ -324,7 +323,6 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
     first = equations_.complementarity(point_);
     on_path = path.begin(first);
   }
-  const bool begun = on_path;
   for (double tried = kTry; on_path; on_path = path.go_on()) {
     if (search.exhausted() || search.counts.factorisations > end) break;
     if (path.pairs.nu() > kTested * first) continue;
@@ -333,10 +331,9 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
     if (path.pairs.nu() < kEnd * first) break;
     if (!(error < kTry && search.best_error < kGain * tried)) continue;
     tried = search.best_error;
-    newton.run(search, search.best.data(), kFirstProblems);
+    newton.run(search, search.best.data(), kProblems);
     if (search.solved()) return;
   }
-  if (begun && !search.exhausted()) newton.run(search, search.best.data(), kLastProblems);
 }
 
 }  // namespace tether::contact::detail

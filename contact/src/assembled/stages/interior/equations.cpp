@@ -9,38 +9,36 @@
 
 namespace tether::contact::detail {
 
-void InteriorEquations::reset(int contacts) {
-  n_ = contacts;
+void InteriorEquations::reset(const System& system) {
+  n_ = system.size();
   for (Packed* p : {&anchor_, &r_, &z_, &w_}) p->resize(at(n_));
   flat_.resize(at(n_));
   tau_ = 0;
-  exact_ = false;
-}
-
-void InteriorEquations::find_flat(const System& system) {
   for (int i = 0; i < n_; ++i) flat_[at(i)] = !(system.friction(i) > 0);
 }
 
 // w_: velocities at z_, of the proximal problem if there is one
-void InteriorEquations::velocities(const System& system) {
-  detail::velocities(system.problem(), exact_, z_.data(), w_.data());
+void InteriorEquations::velocities(const Search& search) {
+  const Problem& p = search.system.problem();
+  detail::velocities(p, search.near_round_off(), z_.data(), w_.data());
   if (!(tau_ > 0)) return;
   for (int i = 0; i < n_; ++i) {
     const double* z = z_[at(i)].v;
     const double* a = anchor_[at(i)].v;
     const double d[3] = {z[0] - a[0], z[1] - a[1], z[2] - a[2]};
-    add_block(system.problem().local(i), tau_, d, w_[at(i)].v);
+    add_block(p.local(i), tau_, d, w_[at(i)].v);
   }
 }
 
 // r = P^-1 (A x - b) - (u - s (1, gamma)), P = diag(mu, 1, 1)
-void InteriorEquations::evaluate(const System& system, const ConePair& point) {
+void InteriorEquations::evaluate(const Search& search, const ConePair& point) {
+  const System& system = search.system;
   const Problem& p = system.problem();
   for (int i = 0; i < n_; ++i) {
     const double* x = point.x[at(i)].v;
     z_[at(i)] = {{flat_[at(i)] ? x[0] : x[0] / p.local(i).mu, x[1], x[2], 0}};
   }
-  velocities(system);
+  velocities(search);
   for (int i = 0; i < n_; ++i) {
     const double* u = point.u[at(i)].v;
     const double* w = w_[at(i)].v;
@@ -78,10 +76,10 @@ double InteriorEquations::natural_map(const System& system) const {
   return std::sqrt(sum);
 }
 
-double InteriorEquations::natural_map(const System& system, const PackedVector* impulses) {
+double InteriorEquations::natural_map(const Search& search, const PackedVector* impulses) {
   std::copy(impulses, impulses + n_, z_.begin());
-  velocities(system);
-  return natural_map(system);
+  velocities(search);
+  return natural_map(search.system);
 }
 
 double InteriorEquations::complementarity(const ConePair& point) const {

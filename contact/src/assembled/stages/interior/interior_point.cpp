@@ -13,33 +13,18 @@ constexpr double kLeastCentre = 1e-3, kCentreAfterBlocked = 0.2;
 
 }  // namespace
 
-void InteriorPoint::reset(int contacts) {
-  n_ = contacts;
-  equations_.reset(contacts);
-  newton_.reset(contacts);
-  sticking_.reset(contacts);
-  point_.resize(contacts);
+void InteriorPoint::reset(const System& system) {
+  n_ = system.size();
+  equations_.reset(system);
+  newton_.reset(n_);
+  sticking_.reset(n_);
+  point_.resize(n_);
   swept_.resize(at(n_));
 }
 
-bool InteriorPoint::order_bodies(Search& search) {
-  if (ordered()) return by_bodies();
-  if (!newton_.matrix().order_by_bodies(search)) return false;
-  equations_.find_flat(search.system);
-  return true;
-}
-
-void InteriorPoint::order(Search& search) {
-  if (ordered()) return;
-  newton_.matrix().order(search);
-  equations_.find_flat(search.system);
-}
-
 void InteriorPoint::stick(Search& search) {
-  if (sticking_.tried()) return;
-  order(search);
+  newton_.matrix().order(search);
   sticking_.find(search, newton_.matrix(), equations_.flat());
-  if (sticking_.found() && sticking_.outside() <= 0) equations_.set_exact(search.near_round_off());
 }
 
 double InteriorPoint::size_over_sticking(Search& search, const PackedVector* x) {
@@ -69,7 +54,7 @@ bool InteriorPoint::start(Search& search) {
     u[0] = u[3] = speed;
     u[1] = u[2] = 0;
   }
-  equations_.evaluate(system, point_);
+  equations_.evaluate(search, point_);
   return true;
 }
 
@@ -78,7 +63,6 @@ bool InteriorPoint::start(Search& search) {
 bool InteriorPoint::place_near(Search& search, const PackedVector* start, double near) {
   System& system = search.system;
   const Problem& p = system.problem();
-  order(search);
   velocities(p, false, start, swept_.data());
   double x_size = 0, u_size = 0;
   for (int i = 0; i < n_; ++i) {
@@ -122,7 +106,7 @@ bool InteriorPoint::place_near(Search& search, const PackedVector* start, double
 
 bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near) {
   if (!place_near(search, start, near)) return false;
-  equations_.evaluate(search.system, point_);
+  equations_.evaluate(search, point_);
   return true;
 }
 
@@ -130,7 +114,7 @@ bool InteriorPoint::start_near(Search& search, const PackedVector* start, double
 bool InteriorPoint::start_proximal(Search& search, double tau, double near) {
   if (!place_near(search, equations_.anchor().data(), near)) return false;
   equations_.set_tau(tau);
-  equations_.evaluate(search.system, point_);
+  equations_.evaluate(search, point_);
   return true;
 }
 
@@ -171,8 +155,7 @@ double InteriorPoint::follow(Search& search, int most, double target) {
     // Close to the cone only with nearly full steps: blocked ones would spoil the centring.
     const double fraction = longest > 0.9 ? std::max(0.9, 1 - mean / (speed * speed)) : 0.8;
     advance(point_, newton_.change(), std::min(1.0, fraction * longest));
-    equations_.set_exact(search.near_round_off());
-    equations_.evaluate(system, point_);
+    equations_.evaluate(search, point_);
     double error;
     if (equations_.tau() > 0) {
       error = equations_.natural_map(system);
@@ -196,11 +179,6 @@ double InteriorPoint::follow(Search& search, int most, double target) {
 void InteriorPoint::run(Search& search, int most) {
   equations_.set_tau(0);
   if (start(search)) follow(search, most, 0);
-}
-
-void InteriorPoint::run_near(Search& search, const PackedVector* x, int most) {
-  equations_.set_tau(0);
-  if (start_near(search, x, 1e-3)) follow(search, most, 0);
 }
 
 // Implicit Euler steps 1 / tau of D x' = -F(x): where the contacts that stick and slide admit no
@@ -232,7 +210,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       // Half the natural map of the problem itself at the anchor is enough: with more accuracy the
       // iteration is no better, with more steps each.
       equations_.set_tau(0);
-      const double before = equations_.natural_map(system, anchor.data());
+      const double before = equations_.natural_map(search, anchor.data());
       if (!start_proximal(search, tau, kNear)) break;
       found = follow(search, kSteps, 0.5 * before) <= 0.8 * before;
       equations_.set_tau(0);

@@ -23,7 +23,7 @@ class StickingPoint {
   double size() const { return size_; }
 
  private:
-  bool factor(const Problem& problem, NewtonMatrix& matrix) const;
+  bool factor(Search& search, NewtonMatrix& matrix) const;
   void refine(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat);
 
   enum class State { unknown, none, found } state_ = State::unknown;
@@ -31,14 +31,13 @@ class StickingPoint {
   Packed x_, z_, w_;  // z: as impulses, w: their velocities
 };
 
-inline double mean_diagonal(const LocalBlock& L) { return (L.a + L.T[0] + L.T[2]) / 3; }
-
 // Follows x o u = nu e, nu -> 0, for x in K and u = w + s (mu, gamma) in K*, w = A x - b. With
 // s = s(u) the velocity w is an explicit function of u, so that one Newton matrix holds the law as
 // well; it is regular for every rank of A (method, eq. 24).
 class InteriorPoint {
  public:
-  void reset(int contacts);
+  explicit InteriorPoint(NewtonMatrix& matrix) : newton_(matrix) {}
+  void reset(const System& system);
   // Tests the point where everything sticks, which run() starts from: one factorisation.
   void stick(Search& search);
   // The size of impulses over that of those by which everything sticks; 0: none are known.
@@ -48,8 +47,6 @@ class InteriorPoint {
   // From the last point of a run, and that point.
   void go_on(Search& search, int most) { follow(search, most, 0); }
   const Packed& impulses() const { return equations_.impulses(); }
-  // From near x.
-  void run_near(Search& search, const PackedVector* x, int most);
   // Proximal point iteration from x, at most `most` problems A + tau D, b + tau D x, which a small
   // tau D makes solvable where the path of the problem itself ends. Each is solved by a few steps
   // of `newton` from the point to which the last step leads or, where that fails, along its own
@@ -59,15 +56,9 @@ class InteriorPoint {
   // The path of run() by its arclength, through the turns where its steps are blocked; `newton`
   // finishes. At most `most` factorisations.
   void run_arclength(Search& search, int most, ProximalNewton& newton);
-  // Orders the matrix, so that cost() knows its fill.
-  void order(Search& search);
-  bool by_bodies() const { return newton_.matrix().by_bodies(); }
-  bool ordered() const { return newton_.matrix().ordered(); }
-  // Estimated ns of one step; by a guess of the fill before order().
-  double cost(const Search& search) const { return newton_.matrix().cost(search); }
-  // Orders it at once where bodies have so many contacts that equations of bodies take the place of
-  // those of contacts; returns whether they do.
-  bool order_bodies(Search& search);
+  // Estimated ns of one step.
+  double cost(const Search& search) { return matrix().cost(search) + newton_.step_cost(search); }
+  NewtonMatrix& matrix() { return newton_.matrix(); }
 
  private:
   struct ArclengthPath;

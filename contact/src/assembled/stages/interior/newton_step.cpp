@@ -12,21 +12,6 @@ namespace {
 
 constexpr double kLeastShift = 1e-13, kMostShift = 1e-8;
 
-typedef double v4 __attribute__((vector_size(32)));
-
-// out = L A R
-TETHER_CLONES void enclose(const PackedBlock& L, const PackedBlock& A, const PackedBlock& R,
-                           PackedBlock& out) {
-  const v4* l = reinterpret_cast<const v4*>(L.column);
-  const v4* a = reinterpret_cast<const v4*>(A.column);
-  v4* o = reinterpret_cast<v4*>(out.column);
-  for (int c = 0; c < 3; ++c) {
-    const double* r = R.column + 4 * c;
-    const v4 h = a[0] * r[0] + a[1] * r[1] + a[2] * r[2];
-    o[c] = l[0] * h[0] + l[1] * h[1] + l[2] * h[2];
-  }
-}
-
 double dot3(const double* x, const double* y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; }
 
 }  // namespace
@@ -38,7 +23,6 @@ void InteriorNewton::reset(int contacts) {
   none_.assign(at(n_), PackedVector());
   scaling_.resize(at(n_));
   sides_.resize(at(n_));
-  matrix_.reset();
 }
 
 void InteriorNewton::reset_shift() { shift_ = kLeastShift; }
@@ -55,10 +39,12 @@ bool InteriorNewton::scale(const System& system, const InteriorEquations& equati
     const double* u = point.u[at(i)].v;
     ConeScaling& s = scaling_[at(i)];
     Sides& sides = sides_[at(i)];
+    ContactBlocks& blocks = matrix_[i];
     sides = {};
+    blocks = {};
     if (equations.flat(i)) {
       if (!s.set_flat(point.x[at(i)].v[0], u[0])) return false;
-      sides.left.column[0] = sides.right.column[0] = 1 / s.d[0];
+      blocks.L.column[0] = blocks.R.column[0] = 1 / s.d[0];
       continue;
     }
     if (!s.set(point.x[at(i)].v, u)) return false;
@@ -77,8 +63,8 @@ bool InteriorNewton::scale(const System& system, const InteriorEquations& equati
       const double inverse = 1 / s.d[r], along = dot3(s.Q + 3 * r, sides.column);
       for (int k = 0; k < 3; ++k) {
         const double q = s.Q[3 * r + k] * (k == 0 ? inverse_mu : 1);
-        sides.right.column[4 * r + k] = inverse * q;
-        sides.left.column[4 * k + r] =
+        blocks.R.column[4 * r + k] = inverse * q;
+        blocks.L.column[4 * k + r] =
             inverse * (q + along * gradient[k] * (k == 0 ? inverse_mu : 1));
       }
     }
@@ -86,63 +72,18 @@ bool InteriorNewton::scale(const System& system, const InteriorEquations& equati
   return true;
 }
 
-// The diagonal block of the Newton matrix, with A in it (whole) or without.
-void InteriorNewton::diagonal(const System& system, double tau, int i, bool whole,
-                              PackedBlock& scaled) const {
-  const Problem& p = system.problem();
-  PackedBlock block;
-  if (whole)
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k)
-      if (p.columns()[at(k)] == i) block = p.blocks()[at(k)];
-  for (int c = 0; c < 3; ++c) {
-    double unit[3] = {0, 0, 0};
-    unit[c] = 1;
-    add_block(p.local(i), tau, unit, block.column + 4 * c);
-    block.column[5 * c] += shift_ * mean_diagonal(p.local(i));
-  }
-  enclose(sides_[at(i)].left, block, sides_[at(i)].right, scaled);
-  for (int c = 0; c < 3; ++c) scaled.column[5 * c] += 1;
-}
-
-bool InteriorNewton::factor_contacts(const System& system, double tau) {
-  const Problem& p = system.problem();
-  PackedBlock scaled;
-  for (int row = 0; row < n_; ++row) {
-    const int i = matrix_.contacts().block_row(row);
-    matrix_.contacts().begin_row(row);
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      const int j = p.columns()[at(k)];
-      if (i != j)
-        enclose(sides_[at(i)].left, p.blocks()[at(k)], sides_[at(j)].right, scaled);
-      else
-        diagonal(system, tau, i, true, scaled);
-      matrix_.contacts().add(j, scaled.column);
-    }
-    if (!matrix_.contacts().end_row()) return false;
-  }
-  return true;
-}
-
-bool InteriorNewton::factor_bodies(const System& system, double tau) {
-  PackedBlock scaled;
-  matrix_.bodies().begin();
-  for (int i = 0; i < n_; ++i) {
-    diagonal(system, tau, i, false, scaled);
-    matrix_.bodies().add(i, scaled, sides_[at(i)].left, sides_[at(i)].right);
-  }
-  return matrix_.bodies().factor();
-}
-
 // Unknowns W dx in the frames of the scalings.
 bool InteriorNewton::factor(Search& search, const InteriorEquations& equations,
                             const ConePair& point) {
   if (!scale(search.system, equations, point)) return false;
-  const double tau = equations.tau();
-  const bool regular =
-      matrix_.by_bodies() ? factor_bodies(search.system, tau) : factor_contacts(search.system, tau);
-  ++search.counts.factorisations;
-  search.counts.work += matrix_.cost(search);
-  return regular;
+  for (int i = 0; i < n_; ++i) {
+    const LocalBlock& L = search.system.problem().local(i);
+    PackedBlock& added = matrix_[i].a;
+    added = own_block(L, equations.tau());
+    for (int c = 0; c < 3; ++c) added.column[5 * c] += shift_ * mean_diagonal(L);
+  }
+  search.counts.work += step_cost(search);
+  return matrix_.factor(search);
 }
 
 // aim = lambda \ (centre e - lambda o lambda) and the right-hand side; corrected: with the

@@ -26,8 +26,7 @@ void advance(ConePair& to, const ConePair& along, double step);
 /// proximal problem A + tau D, b + tau D anchor where tau > 0.
 class InteriorEquations {
  public:
-  void reset(int contacts);
-  void find_flat(const System& system);
+  void reset(const System& system);
   /// mu = 0: x_n and u_n alone.
   bool flat(int i) const { return flat_[at(i)] != 0; }
   const std::vector<char>& flat() const { return flat_; }
@@ -37,26 +36,22 @@ class InteriorEquations {
   /// 0: the problem itself.
   void set_tau(double tau) { tau_ = tau; }
   double tau() const { return tau_; }
-  /// Velocities by long sums.
-  void set_exact(bool exact) { exact_ = exact; }
-
-  /// The residual r of a point, its impulses z and their velocities.
-  void evaluate(const System& system, const ConePair& point);
+  /// The residual r of a point, its impulses z and their velocities, near round-off by long sums.
+  void evaluate(const Search& search, const ConePair& point);
   const Packed& residual() const { return r_; }
   const Packed& impulses() const { return z_; }
   /// Residual of the (proximal) problem at the impulses of the last evaluate().
   double natural_map(const System& system) const;
   /// The same at other impulses, which take their place.
-  double natural_map(const System& system, const PackedVector* impulses);
+  double natural_map(const Search& search, const PackedVector* impulses);
   /// x.u / contacts, which falls to 0 on the way.
   double complementarity(const ConePair& point) const;
 
  private:
-  void velocities(const System& system);
+  void velocities(const Search& search);
 
   int n_ = 0;
   double tau_ = 0;
-  bool exact_ = false;
   std::vector<char> flat_;
   Packed anchor_, r_, z_, w_;
 };
@@ -80,9 +75,13 @@ inline void add_block(const LocalBlock& L, double f, const double* x, double* w)
 /// section 6).
 class InteriorNewton {
  public:
+  explicit InteriorNewton(NewtonMatrix& matrix) : matrix_(matrix) {}
   void reset(int contacts);
   NewtonMatrix& matrix() { return matrix_; }
-  const NewtonMatrix& matrix() const { return matrix_; }
+  /// Estimated ns of a step besides its factorisation; by bodies, that contains it.
+  double step_cost(const Search& search) const {
+    return matrix_.by_bodies() ? 0 : 150.0 * search.system.size();
+  }
 
   /// At a point; false: it has reached its cone, or the matrix is singular.
   bool factor(Search& search, const InteriorEquations& equations, const ConePair& point);
@@ -105,22 +104,18 @@ class InteriorNewton {
   void adapt_shift(double longest_step);
 
  private:
-  // Around contact i the Newton matrix is left A right + 1, left = D^-1 Q J^-1 P^-1 and
-  // right = P^-1 Q' D^-1; J^-1 = 1 + column gradient'.
+  // The Newton matrix is L (A + tau D + shift) R + 1, L = D^-1 Q J^-1 P^-1 and R = P^-1 Q' D^-1 at
+  // each contact; J^-1 = 1 + column gradient'.
   struct Sides {
-    PackedBlock left, right;
     double column[3], gradient[3];
   };
   bool scale(const System& system, const InteriorEquations& equations, const ConePair& point);
-  bool factor_contacts(const System& system, double tau);
-  bool factor_bodies(const System& system, double tau);
-  void diagonal(const System& system, double tau, int i, bool whole, PackedBlock& scaled) const;
   void aim(const InteriorEquations& equations, double centre, bool corrected);
   double expand(const System& system, const InteriorEquations& equations);
 
   int n_ = 0;
   double shift_ = 0;
-  NewtonMatrix matrix_{3, 150};
+  NewtonMatrix& matrix_;
   std::vector<ConeScaling> scaling_;
   std::vector<Sides> sides_;
   ConePair change_;

@@ -14,34 +14,19 @@ void StickingPoint::reset(int contacts) {
 }
 
 // A, shifted.
-bool StickingPoint::factor(const Problem& p, NewtonMatrix& matrix) const {
+bool StickingPoint::factor(Search& search, NewtonMatrix& matrix) const {
   // Below the eigenvalues that light bodies between heavy ones leave (1e-12 of the largest for 200
   // boxes of masses 1 : 1e6), above the rounding of A; by bodies above what cancels.
   const double shift = matrix.by_bodies() ? 1e-9 : 1e-12;
-  const int n = p.contacts();
-  if (matrix.by_bodies()) {
-    PackedBlock unit, block;
-    for (int c = 0; c < 3; ++c) unit.column[5 * c] = 1;
-    matrix.bodies().begin();
-    for (int i = 0; i < n; ++i) {
-      for (int c = 0; c < 3; ++c) block.column[5 * c] = shift * mean_diagonal(p.local(i));
-      matrix.bodies().add(i, block, unit, unit);
+  const Problem& p = search.system.problem();
+  for (int i = 0; i < p.contacts(); ++i) {
+    matrix[i] = {};
+    for (int c = 0; c < 3; ++c) {
+      matrix[i].a.column[5 * c] = shift * mean_diagonal(p.local(i));
+      matrix[i].L.column[5 * c] = matrix[i].R.column[5 * c] = 1;
     }
-    return matrix.bodies().factor();
   }
-  BlockLu& lu = matrix.contacts();
-  for (int row = 0; row < n; ++row) {
-    const int i = lu.block_row(row);
-    lu.begin_row(row);
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      PackedBlock block = p.blocks()[at(k)];
-      if (p.columns()[at(k)] == i)
-        for (int c = 0; c < 3; ++c) block.column[5 * c] += shift * mean_diagonal(p.local(i));
-      lu.add(p.columns()[at(k)], block.column);
-    }
-    if (!lu.end_row()) return false;
-  }
-  return true;
+  return matrix.factor(search, 0);
 }
 
 void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat) {
@@ -49,9 +34,7 @@ void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector
   state_ = State::none;
   const Problem& p = search.system.problem();
   const int n = p.contacts();
-  if (!factor(p, matrix)) return;
-  ++search.counts.factorisations;
-  search.counts.work += matrix.cost(search);
+  if (!factor(search, matrix)) return;
   for (int i = 0; i < n; ++i) z_[at(i)] = p.packed_b()[at(i)];
   matrix.solve(z_.data());
   size_ = outside_ = 0;
