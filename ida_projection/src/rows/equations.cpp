@@ -319,13 +319,11 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
 
   const int m = rows.rows();
   const auto contains = [&](int i, int j) { return away.C(i, j) != 0.0 || here.C(i, j) != 0.0; };
-  Span plain;  // rows of differential variables alone
-  std::vector<int> hanging, equations;
+  std::vector<int> hanging, of_differential, equations;
   for (int i = 0; i < m; ++i) {
-    if (std::any_of(algebraic.begin(), algebraic.end(), [&](int j) { return contains(i, j); }))
-      hanging.push_back(i);
-    else
-      plain.add(here.C.row(i).transpose(), kQuotientRounding);
+    const bool hangs =
+        std::any_of(algebraic.begin(), algebraic.end(), [&](int j) { return contains(i, j); });
+    (hangs ? hanging : of_differential).push_back(i);
   }
   if (hanging.empty()) return found;
   const std::vector<char> is_equation = derivative_free();
@@ -337,6 +335,8 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
       !here.evaluate_equations(residual, equations, WT, free, algebraic))
     return found;
 
+  Span plain;
+  for (int i : of_differential) plain.add(here.C.row(i).transpose(), kQuotientRounding);
   const auto [joint, used] = rows_in_new_directions(hanging, plain, algebraic, away, here);
   if (joint.empty()) return found;
   found.moves = algebraic_in(joint, used, algebraic, {away, here});
