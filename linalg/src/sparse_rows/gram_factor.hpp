@@ -34,7 +34,6 @@ class GramFactor {
   /// Returns sqrt(d_k - eps) for row i, the k-th of the order.
   double independent_part(int i) const;
   int rows() const { return m_; }
-  long entries_of_factor() const { return static_cast<long>(L_.value.size()); }
 
  private:
   int place_of(int i) const { return place_[static_cast<std::size_t>(i)]; }
