@@ -14,10 +14,10 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scene" / "tools"))
 import verify  # noqa: E402
-from verify import V, rotation  # noqa: E402
+from certificate import V, rotation  # noqa: E402
 
 SCENES = {"rolling_sphere": 0.02, "icy_wedge": 0.01, "stack": 0.05, "cart": 0.005, "gripper": 0.01, "pulled_block": 0.1, "bricard": 0.1,
-          "clearance": 0.001, "hanging_frame": 0.5, "rocking_block": 2.0}
+          "clearance": 0.001, "hanging_frame": 0.5, "rocking_block": 2.0, "capstan": 0.02, "stick_slip": 0.3}
 PART = 1e-3  # of a number: what a small fault changes
 
 
@@ -89,20 +89,20 @@ def other_mass(random_, lines):
 
 
 def shifted(random_, lines):
-    k, n = pick(random_, lines[20:], "to")
+    k, n = pick(random_, lines, "to")
     n[1 + random_.randrange(3)] += PART * (1 + random_.random())
-    put(lines, k + 20, n)
+    put(lines, k, n)
 
 
 def faster(random_, lines):
-    k, n = pick(random_, lines[20:], "to")
+    k, n = pick(random_, lines, "to")
     n[8 + random_.randrange(3)] += 10 * PART * (1 + random_.random())
-    put(lines, k + 20, n)
+    put(lines, k, n)
 
 
 def joints_pull(random_, lines):
-    k, n = pick(random_, lines, "pull", lambda n: abs(V(n[2:5])) > 0.1 * PULL)
-    n[2 + max(range(3), key=lambda i: abs(n[2 + i]))] *= 1 + PART
+    k, n = pick(random_, lines, "pull", lambda n: abs(n[1]) > 0.1 * PULL)
+    n[1] *= 1 + PART
     put(lines, k, n)
 
 
@@ -116,27 +116,27 @@ def residual_claimed(random_, lines):
 
 
 def lost_push(random_, lines):
-    k, _ = pick(random_, lines, "push")
+    k, _ = pick(random_, lines, "push", lambda n: abs(V(n[1:4])) > 1e-6)
     del lines[k]
     lines[-1] = f"end {len(lines) - 1}\n"
 
 
 def turned_body(random_, lines):
-    k, n = pick(random_, lines[20:], "to")
+    k, n = pick(random_, lines, "to")
     n[4:8] = V(n[4:8]).then(rotation(V((0.01, 0.0, 0.0))))
-    put(lines, k + 20, n)
+    put(lines, k, n)
 
 
 def beyond_numbers(random_, lines):
     """Bounds that are parts of the speeds must not grow with them beyond all numbers."""
-    k, n = pick(random_, lines[20:], "to")
+    k, n = pick(random_, lines, "to")
     n[8 + random_.randrange(3)] = 10.0 ** random_.choice((153, 160, 200, 308))
-    put(lines, k + 20, n)
+    put(lines, k, n)
 
 
-def moving_ground(random_, lines):
-    k, n = pick(random_, lines[:20], "to")
-    n[8 + random_.randrange(3)] = PART
+def other_gravity(random_, lines):
+    k, n = pick(random_, lines, "engine", lambda n: abs(V(n[0:3])) > 0)
+    n[0:3] = V(n[0:3]) * 0.5
     put(lines, k, n)
 
 
@@ -147,7 +147,7 @@ def unsolved(random_, lines):
 
 
 FAULTS = (off_the_cone, swapped_sign, turned_friction, weaker_contact, lost_contact, other_mass, shifted, faster, joints_pull,
-          residual_claimed, lost_push, turned_body, beyond_numbers, moving_ground, unsolved)
+          residual_claimed, lost_push, turned_body, beyond_numbers, other_gravity, unsolved)
 
 
 def judged(program, file, lines):
@@ -199,7 +199,8 @@ def main(program, scenes):
             whole[name] = file.read_text().splitlines(keepends=True)
             alone = subprocess.run([sys.executable, verify.__file__, str(file)], capture_output=True).returncode
             if (alone, *judged(program, file, whole[name])) != (0, 0, 0):
-                return f"{name}, as it was written: {verify.Judge().run(file).faults[:3]}"
+                verify.main([file])
+                return f"{name}, as it was written, does not hold"
         bad = damaged(random_, program, file, whole["cart"])
         if bad:
             return f"damaged and not told so: {bad}"
@@ -207,7 +208,7 @@ def main(program, scenes):
             fault, name = FAULTS[planted % len(FAULTS)], random_.choice(sorted(whole))
             lines = list(whole[name])
             PRESS = max((abs(V(numbers(each)[16:19])) for each in lines if each.startswith("contact ")), default=math.inf)
-            PULL = max((abs(V(numbers(each)[2:5])) for each in lines if each.startswith("pull ")), default=math.inf)
+            PULL = max((abs(numbers(each)[1]) for each in lines if each.startswith("pull ")), default=math.inf)
             try:
                 fault(random_, lines)
             except IndexError:  # nothing of the kind in it

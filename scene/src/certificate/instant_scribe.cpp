@@ -9,30 +9,24 @@
 
 namespace tether::scene::certificate {
 
-namespace {
-
-mechanics::Bodies moving_bodies(const Scene& scene) {
-  mechanics::Bodies out = mechanics::placed_bodies(scene);
-  for (const std::size_t b : scene.moving()) {
-    const Body& body = scene.bodies[b];
-    out.inertia[b] = {out.moving++, body.mass, body.inertia, body.inertia.inverse()};
-  }
-  return out;
-}
-
-}  // namespace
-
 InstantScribe::InstantScribe(const Scene& scene, const Engine& engine, Accelerations accelerations,
                              Sheet& sheet)
     : scene_(scene),
       engine_(engine),
       accelerations_(std::move(accelerations)),
       sheet_(sheet),
-      bodies_(moving_bodies(scene)),
-      rows_(scene, bodies_) {
-  for (std::size_t j = 0; j < scene.joints.size(); ++j)
-    if (const Joint& joint = scene.joints[j]; joint.limits || joint.motor || joint.friction != 0)
-      laws_.emplace_back(static_cast<int>(j), joints::Coordinate(joint, bodies_));
+      bodies_(mechanics::weighed_bodies(scene)),
+      joints_(scene) {
+  for (std::size_t i = 0; i < scene.springs.size(); ++i) {
+    const Spring& each = scene.springs[i];
+    if (!each.cable || each.cable->capstans.empty()) continue;
+    if (each.cable->capstans.size() > 1)
+      throw std::invalid_argument(fmt::format(
+          "certificates of events know one ring that rubs, and cable \"{}\" has {}: run "
+          "it without --certificate, or in steps",
+          each.name, each.cable->capstans.size()));
+    slips_.emplace_back(each, i, each.cable->capstans[0], bodies_);
+  }
   forces_ = effects::make_forces(scene, bodies_);
   loads_.resize(at(bodies_.moving));
   sheet.begin(scene, engine.name(), *this);
@@ -53,7 +47,7 @@ void InstantScribe::flush() {
   set_places(last_, engine_.bodies());
   put_pushes(out);
   put_contacts(out);
-  put_joints(out);
+  if (!scene_.joints.empty()) joints_.put_pulls(bodies_, last_, engine_.forces().joints, out);
   sheet_.put(out);
 }
 
@@ -77,7 +71,7 @@ void InstantScribe::put_impact(double time, const std::vector<BodyState>& before
   std::string out, inside;
   set_places(time, after);
   Eigen::VectorXd momenta = Eigen::VectorXd::Zero(6 * bodies_.moving);
-  Line(out, "arrives") << time;
+  Line(out, "reached") << time;
   for (const std::size_t b : scene_.moving()) {
     Line(out, "to") << static_cast<int>(b) << before[b];
     const Eigen::Matrix3d& R = bodies_.frames[b].R;
@@ -121,66 +115,34 @@ void InstantScribe::put_impact(double time, const std::vector<BodyState>& before
     Line(inside, "contact") << c.first << c.second << c.point << c.point << c.normal << c.gap
                             << bias << belts << c.force << c.moment;
   }
-  put_reactions(time, after, std::move(momenta), inside);
+  if (!scene_.joints.empty()) put_reactions(time, momenta, inside);
   Line(out, "part") << time << 0.0 << (exact ? 0 : 1) << worst;
   out += inside;
   for (const std::size_t b : scene_.moving()) Line(out, "to") << static_cast<int>(b) << after[b];
   sheet_.put(out);
 }
 
-// The reactions of least size along what joints hold, and along the coordinates of their laws.
-void InstantScribe::put_reactions(double time, const std::vector<BodyState>& after,
-                                  Eigen::VectorXd momenta, std::string& out) {
-  if (scene_.joints.empty()) return;
-  set_places(time, after);
-  rows_.set_time(time);
-  struct Unit {
-    int joint, body[2];
-    mechanics::Wrench<double> on[2];
-  };
-  std::vector<Unit> units;
-  rows_.each([&](const auto& row) {
-    for (int i = 0; i < row.count; ++i) {
-      Unit u{row.joint, {row.first, row.second}, {}};
-      u.on[0] = u.on[1] = mechanics::no_wrench<double>();
-      double one[3] = {0, 0, 0};
-      one[i] = 1;
-      row.pull(bodies_.frames[at(row.first)], bodies_.frames[at(row.second)], one, u.on[0],
-               u.on[1]);
-      units.push_back(u);
-    }
-  });
-  for (const auto& [joint, along] : laws_) {
-    Unit u{joint, {along.first(), along.second()}, {}};
-    along.gradient(bodies_, u.on[0], u.on[1]);
-    units.push_back(u);
-  }
+// The reactions of least size that make up these momenta.
+void InstantScribe::put_reactions(double time, const Eigen::VectorXd& momenta, std::string& out) {
+  const std::vector<JointLines::Unit> units = joints_.units(bodies_, time);
   Eigen::MatrixXd G = Eigen::MatrixXd::Zero(momenta.size(), static_cast<int>(units.size()));
-  for (int k = 0; k < G.cols(); ++k)
-    for (int side = 0; side < 2; ++side) {
-      const int slot = bodies_.inertia[at(units[at(k)].body[side])].slot;
+  for (std::size_t k = 0; k < units.size(); ++k)
+    for (std::size_t side = 0; side < 2; ++side) {
+      const int slot = bodies_.inertia[at(units[k].body[side])].slot;
       if (slot < 0) continue;
-      G.block<3, 1>(6 * slot, k) += units[at(k)].on[side].force;
-      G.block<3, 1>(6 * slot + 3, k) += units[at(k)].on[side].torque;
+      G.block<3, 1>(6 * slot, static_cast<int>(k)) += units[k].on[side].force;
+      G.block<3, 1>(6 * slot + 3, static_cast<int>(k)) += units[k].on[side].torque;
     }
   const Eigen::VectorXd x = G.completeOrthogonalDecomposition().solve(momenta);
-  std::vector<std::array<mechanics::Wrench<double>, 2>> sums(
-      scene_.joints.size(), {mechanics::no_wrench<double>(), mechanics::no_wrench<double>()});
-  for (int k = 0; k < G.cols(); ++k)
-    for (std::size_t side = 0; side < 2; ++side) {
-      auto& sum = sums[at(units[at(k)].joint)][side];
-      sum.force += x[k] * units[at(k)].on[side].force;
-      sum.torque += x[k] * units[at(k)].on[side].torque;
-    }
-  for (std::size_t j = 0; j < sums.size(); ++j)
-    Line(out, "pull") << static_cast<int>(j) << 0 << sums[j][0] << sums[j][1];
+  for (std::size_t k = 0; k < units.size(); ++k)
+    Line(out, "pull") << units[k].number << x[static_cast<int>(k)];
 }
 
 void InstantScribe::put_pushes(std::string& out) {
   for (const auto& force : forces_) {
     const std::string_view name = force->name();
-    // The judge has the gyroscopic term of its own; forces of joints have those of their springs.
-    if (name == "gyroscopic term" || name == "joint springs") continue;
+    // The judge has these of its own; forces of joints have those of their springs.
+    if (name == "gravity" || name == "gyroscopic term" || name == "joint springs") continue;
     for (mechanics::Load6& each : loads_)
       each.force = each.torque_body = each.torque_world = Vector3d::Zero();
     force->add(bodies_, loads_);
@@ -190,6 +152,16 @@ void InstantScribe::put_pushes(std::string& out) {
       if (load.force.isZero(0) && torque.isZero(0)) continue;
       Line(out, "push") << static_cast<int>(b) << load.force << torque << name;
     }
+  }
+  if (slips_.empty()) return;
+  const std::vector<SpringForce> tensions = engine_.forces().springs;
+  for (const effects::CapstanSlip& slip : slips_) {
+    const SpringForce& cable = tensions[at(slip.cable())];
+    const double x = (cable.tension - cable.tension_second) / 2;
+    slip.each_load(bodies_, [&](int body, const mechanics::Wrench<double>& unit) {
+      Line(out, "push") << body << Vector3d(x * unit.force) << Vector3d(x * unit.torque)
+                        << "capstan friction";
+    });
   }
 }
 
@@ -210,18 +182,6 @@ void InstantScribe::put_contacts(std::string& out) const {
     belts -= c.normal.dot(belts) * c.normal;
     Line(out, "contact") << c.first << c.second << c.point << c.point << c.normal << c.gap << 0.0
                          << belts << c.force << c.moment;
-  }
-}
-
-void InstantScribe::put_joints(std::string& out) const {
-  if (scene_.joints.empty()) return;
-  const std::vector<JointForce> forces = engine_.forces().joints;
-  for (std::size_t j = 0; j < forces.size(); ++j) {
-    const JointForce& f = forces[j];
-    const auto about = [&](int body) { return Vector3d((f.at - centre(body)).cross(f.force)); };
-    Line(out, "pull") << static_cast<int>(j) << 0 << f.force
-                      << Vector3d(f.moment + about(scene_.joints[j].first)) << Vector3d(-f.force)
-                      << Vector3d(-f.moment - about(scene_.joints[j].second));
   }
 }
 

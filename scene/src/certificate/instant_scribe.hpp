@@ -2,9 +2,10 @@
 // BSD-3-Clause
 #pragma once
 
+#include "certificate/joint_lines.hpp"
 #include "certificate/sheet.hpp"
+#include "effects/cable.hpp"
 #include "effects/list.hpp"
-#include "joints/joint_rows.hpp"
 
 namespace tether::scene::certificate {
 
@@ -31,9 +32,7 @@ class InstantScribe final : public Source {
  private:
   void put_pushes(std::string& out);
   void put_contacts(std::string& out) const;
-  void put_joints(std::string& out) const;
-  void put_reactions(double time, const std::vector<BodyState>& after, Eigen::VectorXd momenta,
-                     std::string& out);
+  void put_reactions(double time, const Eigen::VectorXd& momenta, std::string& out);
   void set_places(double time, const std::vector<BodyState>& states);
   Vector3d surface_velocity(int body, const Vector3d& point) const;
   Vector3d centre(int body) const;
@@ -43,9 +42,9 @@ class InstantScribe final : public Source {
   Accelerations accelerations_;
   Sheet& sheet_;
   mechanics::Bodies bodies_;
-  joints::JointRows rows_;
-  std::vector<std::pair<int, joints::Coordinate>> laws_;  // of joints
+  JointLines joints_;
   std::vector<std::unique_ptr<mechanics::Force>> forces_;
+  std::vector<effects::CapstanSlip> slips_;
   std::vector<mechanics::Load6> loads_;
   double last_ = -1;  // s, written
 };

@@ -12,6 +12,7 @@ namespace tether::scene::certificate {
 /// equal.
 struct Friction {
   double along = 0, across = 0;
+  double holds = 0;  ///< that along of one that does not slip, where it is larger
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();
   bool associated = false;  ///< maximum dissipation instead of Coulomb's law
 };
@@ -39,7 +40,11 @@ inline double natural_residual(const Friction& friction, const Eigen::Vector3d& 
     p.tail<2>() *= size > 0 ? onto / size : 0.0;
   }
   const double off = m1 > 0 || m2 > 0 ? 0 : (y - n.dot(y) * n).norm();
-  return std::max((x - p).norm(), off);
+  const double slides = std::max((x - p).norm(), off);
+  if (!(friction.holds > m1)) return slides;
+  const Friction held{friction.holds, m1 > 0 ? m2 * friction.holds / m1 : 0, 0, friction.axis,
+                      friction.associated};
+  return std::min(slides, std::max(natural_residual(held, n, y, w), (w - n.dot(w) * n).norm()));
 }
 
 }  // namespace tether::scene::certificate

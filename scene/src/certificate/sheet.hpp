@@ -5,7 +5,6 @@
 #include <optional>
 #include <tether/scene/scene.hpp>
 
-#include "joints/rows.hpp"
 #include "natural_map.hpp"
 #include "output/files.hpp"
 
@@ -31,8 +30,6 @@ class Line {
   Line& operator<<(const BodyState& s) {
     return *this << s.position << s.orientation << s.velocity << s.angular_velocity;
   }
-  /// Force and torque about the centre.
-  Line& operator<<(const joints::Wrench<double>& w) { return *this << w.force << w.torque; }
   Line& operator<<(std::string_view text);
 
  private:

@@ -1,14 +1,14 @@
-// Tether: what a certificate tells: lines, bodies, joints. SPDX-License-Identifier: BSD-3-Clause
+// Tether: what a certificate tells: lines, bodies, rows of joints, contacts.
+// SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
 #include <Eigen/LU>
 #include <array>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <tether/linalg/pi.hpp>
+#include <string_view>
 #include <vector>
 
 #include "natural_map.hpp"
@@ -19,15 +19,24 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Numbers = std::vector<double>;
 
+/// The words of a certificate, which it begins with: the names of their numbers, `name:n` of n,
+/// and a text at the end (docs/certificate.md).
+extern const char* const kForms;
+
 /// A file that cannot be judged: damaged, cut, or with a part missing.
 struct Damaged : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A line as docs/certificate.md explains it.
+/// A line.
 struct Record {
   std::string word, text;
   Numbers numbers;
+  double operator[](std::size_t k) const { return numbers[k]; }
+  Vector3d vector(std::size_t k) const { return {numbers[k], numbers[k + 1], numbers[k + 2]}; }
+  Quaterniond quaternion(std::size_t k) const {
+    return {numbers[k], numbers[k + 1], numbers[k + 2], numbers[k + 3]};
+  }
 };
 
 /// Reads a certificate line by line.
@@ -40,124 +49,121 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& what) const;
+  std::string_view next_line();
 
   std::ifstream in_;
   std::vector<char> buffer_;  // of a line
-  long line_ = 1;
+  long line_ = 0;
   bool ended_ = false;
 };
 
-inline Vector3d vector(const Numbers& n, std::size_t k) { return {n[k], n[k + 1], n[k + 2]}; }
-inline Quaterniond quaternion(const Numbers& n, std::size_t k) {
-  return {n[k], n[k + 1], n[k + 2], n[k + 3]};
-}
+/// The turn by |v| rad about v.
 inline Quaterniond rotation(const Vector3d& v) {
   const double a = v.norm(), s = a > 0 ? std::sin(a / 2) / a : 0.5;
   return {std::cos(a / 2), s * v.x(), s * v.y(), s * v.z()};
 }
+/// Angle between two orientations, rad.
 inline double apart(const Quaterniond& p, const Quaterniond& q) {
   return 2 * std::min((p.coeffs() - q.coeffs()).norm(), (p.coeffs() + q.coeffs()).norm());
 }
 
 /// State of a body, world axes.
-struct Told {
+struct State {
   Vector3d x = Vector3d::Zero(), v = Vector3d::Zero(), w = Vector3d::Zero();
   Quaterniond q = Quaterniond::Identity();
-  /// Velocity of its point at this place from the centre.
-  Vector3d velocity(const Vector3d& r) const { return v + w.cross(r); }
+  double time = 0;  ///< s
+  State() = default;
+  /// Reads a line `to`.
+  State(const Record& to, double at)
+      : x(to.vector(1)), v(to.vector(8)), w(to.vector(11)), q(to.quaternion(4)), time(at) {}
+  /// Velocity of its point at this place, m/s.
+  Vector3d velocity(const Vector3d& p) const { return v + w.cross(p - x); }
 };
-inline double apart(const Told& a, const Told& b) {
-  return (a.x - b.x).norm() + (a.v - b.v).norm() + (a.w - b.w).norm() + apart(a.q, b.q);
-}
+using States = std::map<double, State>;  ///< by the number of the body
 
 /// Impulse, or force, and its moment about the centre; the sums of their sizes.
 struct Load {
-  Vector3d force = Vector3d::Zero(), torque = Vector3d::Zero();
-  double forces = 0, torques = 0;
+  Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();
+  double forces = 0, moments = 0;
   void add(const Vector3d& f, const Vector3d& m) {
-    force += f, torque += m;
-    forces += f.norm(), torques += m.norm();
+    force += f, moment += m;
+    forces += f.norm(), moments += m.norm();
   }
 };
 
+/// A body; mass 0: it is fixed, and nothing moves it.
 struct ToldBody {
-  double mass = 0, material = -1, time = 0;
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-  std::string name;
-  std::optional<Told> state;
-  Vector3d belt = Vector3d::Zero(), belt_turn = Vector3d::Zero(), axis = Vector3d::Zero();
-
-  bool is_round() const {
-    return (inertia - inertia(0, 0) * Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <=
-           1e-13 * inertia(0, 0);
-  }
+  explicit ToldBody(const Record& line);
+  /// Angular momentum, world axes, and the angular velocity of one.
   Vector3d spin(const Quaterniond& q, const Vector3d& w) const {
     return q * (inertia * (q.conjugate() * w));
   }
   Vector3d unspin(const Quaterniond& q, const Vector3d& momentum) const {
-    return q * (inertia.inverse() * (q.conjugate() * momentum));
+    return q * (inverse * (q.conjugate() * momentum));
   }
-  Told struck(const Load& load) const {
-    Told s = *state;
-    s.v += load.force / mass, s.w += unspin(s.q, load.torque);
+  State struck(State s, const Load& load) const {
+    s.v += light * load.force, s.w += unspin(s.q, load.moment);
     return s;
   }
-  /// Velocity of the surface against the body at a place from its centre.
-  Vector3d belt_at(const Vector3d& r) const {
-    return state->q * (belt + belt_turn.cross(state->q.conjugate() * r));
+  /// Velocity of the surface against the body at a place.
+  Vector3d belt(const State& s, const Vector3d& p) const {
+    return s.q * (surface + surface_spin.cross(s.q.conjugate() * (p - s.x)));
   }
+
+  double mass, light, material;  ///< light: the inverse mass, 0: fixed
+  Eigen::Matrix3d inertia, inverse;
+  double radius = 0;  ///< from the trace of the inertia, m
+  Vector3d surface, surface_spin, axis;
+  std::string name;
 };
 
-struct ToldContact {
-  explicit ToldContact(const Numbers& m)
-      : body{m[0], m[1]},
-        on{vector(m, 2), vector(m, 5)},
-        n(vector(m, 8)),
-        gap(m[11]),
-        bias(m[12]),
-        slip(vector(m, 13)),
-        x(vector(m, 16)),
-        moment(vector(m, 19)) {}
-  std::array<double, 2> body;
-  Vector3d on[2], n;
-  double gap, bias;
-  Vector3d slip, x, moment;
-};
-
-/// A joint by its points and frames on both bodies alone. It holds directions of the second
-/// body's frame in which points, and turns, do not move against each other.
-class ToldJoint {
+/// One equation of a joint, or with `turn` and `way` a direction that it leaves free.
+class ToldRow {
  public:
-  explicit ToldJoint(const Record& line);
+  explicit ToldRow(const Record& line);
 
-  /// Its bodies as they are.
-  struct Place {
-    Vector3d at, d;                     ///< the point on the first; from that on the second to it
-    Quaterniond turn;                   ///< of the first frame in the second
-    std::vector<Vector3d> held, turns;  ///< directions
-    Vector3d z;                         ///< of laws
+  /// How far it is off, m or rad, and the impulse, or the moment, on its first body for an impulse
+  /// of 1, with the place where it acts.
+  struct Value {
+    double off;
+    Vector3d force, moment, at;
   };
-  Place place(const Told (&s)[2]) const;
+  Value value(const State& a, const State& b, double time) const;
+  /// Its motion's frequency, rad/s.
+  double frequency() const;
+  /// 1 m and the lengths of its arms.
+  double reach() const { return 1 + on_.norm() + on_second_.norm(); }
 
-  /// Errors of places (m, rad), and of the speeds of points and of turns.
-  std::array<Numbers, 3> errors(const Told (&s)[2], double t) const;
-  /// How fast the errors of speeds grow, the largest of points and of turns, at these
-  /// accelerations: by differences over a short time.
-  std::array<double, 2> accelerations(const Told (&s)[2], const std::array<Vector3d, 2> (&rates)[2],
-                                      double t) const;
-
-  double arms() const { return point_[0].norm() + point_[1].norm(); }
-
-  std::string kind, name;
-  double body[2];  ///< numbers as the file has them; -1: the world
-  bool has_laws;
+  double first, second;  ///< numbers of bodies; -1: the world
+  std::string name;
 
  private:
-  bool driven_;
-  Vector3d point_[2];
-  Quaterniond frame_[2];
-  double length_, motion_[4];
-  std::string held_, turns_;
+  std::string kind_;
+  Vector3d on_, on_second_, axis_;
+  double length_;
+  std::array<double, 4> motion_;
+};
+
+/// A contact.
+struct ToldContact {
+  explicit ToldContact(const Record& m)
+      : body{m[0], m[1]},
+        on{m.vector(2), m.vector(5)},
+        n(m.vector(8)),
+        gap(m[11]),
+        bias(m[12]),
+        slip(m.vector(13)),
+        x(m.vector(16)),
+        moment(m.vector(19)) {}
+  /// Velocity of the first body against the second.
+  Vector3d velocity(const States& states) const {
+    return states.at(body[0]).velocity(on[0]) - states.at(body[1]).velocity(on[1]);
+  }
+  std::array<double, 2> body;
+  std::array<Vector3d, 2> on;
+  Vector3d n;
+  double gap, bias;
+  Vector3d slip, x, moment;
 };
 
 }  // namespace tether::scene::certificate

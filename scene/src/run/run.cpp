@@ -373,17 +373,6 @@ bool RunResult::met() const {
 
 RunResult run(const Scene& scene, const RunOptions& options) {
   if (scene.output["certificate"].empty()) return Run(scene, options).go();
-  const auto refuse = [](const std::string& law, const std::string& owner) {
-    throw std::invalid_argument(
-        fmt::format("certificates do not know {} has: run it without --certificate", law + owner));
-  };
-  for (const Spring& each : scene.springs)
-    if (each.cable && !each.cable->capstans.empty())
-      refuse("capstan friction, which cable \"", each.name + "\"");
-  for (const Pair& each : scene.pairs)
-    if (each.static_friction)
-      refuse("static_friction, which the pair of \"",
-             each.first + "\" and \"" + each.second + "\"");
   certificate::Sheet sheet(scene);
   Scene observed = scene;
   observed.certificate = &sheet;

@@ -19,10 +19,10 @@ bool same(const BodyState& a, const BodyState& b) {
   return same_place(a, b) && a.velocity == b.velocity && a.angular_velocity == b.angular_velocity;
 }
 
-// Stages that are no forces.
+// Stages that are no forces, and the weight, which the judge knows.
 bool is_mechanism(std::string_view effect) {
-  return contains(std::array<std::string_view, 6>{"joints", "contact", "restitution", "collision",
-                                                  "penetration", "motion"},
+  return contains(std::array<std::string_view, 7>{"joints", "contact", "restitution", "collision",
+                                                  "penetration", "motion", "gravity"},
                   effect);
 }
 
@@ -37,9 +37,11 @@ StepScribe::StepScribe(const Scene& scene, contact::Stepper& stepper, certificat
       stepper_(stepper),
       sheet_(sheet),
       held_(scene.bodies.size(), 0),
-      chain_(scene.bodies.size()) {
+      chain_(scene.bodies.size()),
+      at_places_(scene) {
   for (const std::size_t i : scene.moving()) moving_.push_back(static_cast<int>(i));
-  if (!scene.joints.empty()) joints_ = std::make_unique<SteppedJoints>(scene);
+  joints_ = std::make_unique<SteppedJoints>(scene);
+  if (!scene.joints.empty()) joint_lines_ = std::make_unique<certificate::JointLines>(scene);
   for (const Joint& joint : scene.joints)
     for (const int body : {joint.first, joint.second})
       if (scene.moves(body)) held_[at(body)] = 1;
@@ -139,9 +141,6 @@ bool StepScribe::take_back(double time, const std::vector<int>& bodies) {
     for (std::size_t i = 0; i < part.bodies.size(); ++i)
       chain_[at(part.bodies[i])] = part.before[i];
     if (!is_at(time, bodies)) continue;
-    trial_.clear();
-    trial_at_ = k - 1;
-    for (std::size_t j = k - 1; j < parts_.size(); ++j) trial_.push_back(parts_[j].text);
     parts_.resize(k - 1);
     return true;
   }
@@ -161,19 +160,10 @@ void StepScribe::explain(double time, const std::vector<int>& bodies) {
   part.start = time;
   part.bodies = bodies;
   for (const int i : bodies) part.before.push_back(chain_[at(i)]);
-  if (reached(same_place) && any(stepper_.contacts().impulses)) {
+  if (reached(same_place) && any(stepper_.contacts().impulses))
     put_impact(part);
-  } else if (stepper_.options().accuracy > 0 && !parts_.empty() && !trial_.empty()) {
-    for (std::string& each : trial_) {
-      each.replace(0, 4, "trial");
-      parts_.insert(parts_.begin() + static_cast<std::ptrdiff_t>(trial_at_++), Part());
-      parts_[trial_at_ - 1].text = std::move(each);
-    }
-    trial_.clear();
-    Line(part.text, "extrapolated") << time;
-  } else {
-    Line(part.text, "start") << time;
-  }
+  else
+    Line(part.text, "reached") << time;
   reach(time, bodies, part.text);
   parts_.push_back(std::move(part));
 }
@@ -191,7 +181,7 @@ void StepScribe::put_impact(Part& part) {
   StepContacts struck = stepper_.contacts();
   std::string inside;
   const double residual = put_contacts(inside, struck, struck.points, begin_);
-  if (hold(part.bodies)) put_joints(inside, begin_, part.start, stepper_.joint_impulses(), 0);
+  if (hold(part.bodies)) put_pulls(inside, begin_, part.start, stepper_.joint_impulses());
   const bool in_turn =
       stepper_.options().simultaneous_impacts == contact::SimultaneousImpacts::in_turn;
   Line(part.text, "part") << part.start << 0.0 << (in_turn ? 1 : 0) << residual;
@@ -228,46 +218,76 @@ double StepScribe::put_contacts(std::string& out, const StepContacts& contacts,
 }
 
 bool StepScribe::hold(const std::vector<int>& bodies) const {
-  return joints_ && any_of(bodies, [&](int i) { return held_[at(i)] != 0; });
+  return joint_lines_ && any_of(bodies, [&](int i) { return held_[at(i)] != 0; });
 }
 
-void StepScribe::put_joints(std::string& out, const std::vector<BodyState>& at, double t,
-                            const std::vector<double>& impulses, int when) {
-  set_places(at);
-  joints_->set_places(places_, t);
-  std::size_t j = 0;
-  for (const auto& [on_first, on_second] : joints_->pulls(impulses))
-    Line(out, "pull") << static_cast<int>(j++) << when << on_first << on_second;
+void StepScribe::put_pulls(std::string& out, const std::vector<BodyState>& at, double t,
+                           const std::vector<double>& impulses) {
+  if (!joint_lines_) return;
+  const mechanics::Bodies& bodies = place(at);
+  joint_lines_->put_pulls(bodies, t, joint_lines_->reactions(bodies, t, impulses), out);
+}
+
+// Joints pull once more at the end of a sub-step, which is a part of no length.
+void StepScribe::put_pulls_at_end(double t, const std::vector<double>& impulses, Part& part) {
+  const mechanics::Bodies& bodies = place(last_);
+  const std::vector<JointForce> pulls = joint_lines_->reactions(bodies, t, impulses);
+  for (std::size_t j = 0; j < pulls.size(); ++j)
+    for (const auto& [body, sign] :
+         {std::pair(scene_.joints[j].first, 1.0), std::pair(scene_.joints[j].second, -1.0)}) {
+      if (!scene_.moves(body)) continue;
+      const contact::BodySet& set = stepper_.bodies();
+      BodyState& s = last_[at(body)];
+      const Vector3d moment = pulls[j].moment + (pulls[j].at - s.position).cross(pulls[j].force);
+      const linalg::Quaternion& q = s.orientation;
+      s.velocity -= sign / set.mass[at(body)] * pulls[j].force;
+      s.angular_velocity -=
+          sign * (q * (set.inertia[at(body)].inverse() * (q.conjugate() * moment)));
+    }
+  for (const int i : now_) Line(part.text, "to") << i << last_[at(i)];
+  Line(part.text, "part") << t << 0.0 << 0 << 0.0;
+  put_pulls(part.text, last_, t, impulses);
 }
 
 // As they were where the sub-step began.
-void StepScribe::put_laws(std::string& out, double t) {
+void StepScribe::put_laws(std::string& out, double t, double dt) {
   if (!joints_->has_laws()) return;
-  set_places(begin_);
+  place(begin_);
   laws_.clear();
   joints_->add_laws(places_, t, laws_);
   const std::vector<double>& impulses = stepper_.law_impulses();
+  joints_->change_bounds(impulses, dt, laws_);
   for (int k = 0; k < laws_.count() && at(k) < impulses.size(); ++k) {
     const contact::JointLaws::Law& law = laws_[k];
-    Line line(out, "law");
-    line << law.joint
-         << (law.limit         ? 0
-             : law.is_sprung() ? 2
-                               : 1)
-         << law.gap << law.restitution << law.rate << law.bound << law.stretch << law.stiffness
-         << law.damping << impulses[at(k)];
-    for (const auto* term = laws_.rows().begin(k); term != laws_.rows().end(k); ++term)
-      line << term->body << Vector3d(term->G.head<3>()) << Vector3d(term->G.tail<3>());
+    const auto *first = laws_.rows().begin(k), *last = laws_.rows().end(k);
+    if (std::none_of(first, last, [&](const auto& term) { return contains(now_, term.body); }))
+      continue;
+    // A spring: x = -dt (stiffness (stretch + dt slip) + damping slip), slip = speed - rate.
+    const double gain = law.stiffness * dt + law.damping;
+    const double wanted =
+        law.is_sprung() ? law.rate - law.stiffness * law.stretch / gain : law.rate;
+    const double most = std::min(law.bound * dt, std::numeric_limits<double>::max());
+    Line(out, "law") << k << (law.limit ? 0 : -most)
+                     << (law.limit ? std::numeric_limits<double>::max() : most)
+                     << (law.limit ? 0 : wanted) << (law.is_sprung() ? 1 / (dt * gain) : 0)
+                     << (law.limit ? law.gap : 0) << (law.limit ? law.restitution : 0)
+                     << impulses[at(k)] << joints_->name(law.joint);
+    for (const auto* term = first; term != last; ++term)
+      Line(out, "on") << k << term->body << Vector3d(term->G.head<3>())
+                      << Vector3d(term->G.tail<3>());
   }
 }
 
-void StepScribe::set_places(const std::vector<BodyState>& of) {
-  places_.position.resize(of.size());
-  places_.orientation.resize(of.size());
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    places_.position[i] = of[i].position;
-    places_.orientation[i] = of[i].orientation;
+const mechanics::Bodies& StepScribe::place(const std::vector<BodyState>& states) {
+  places_ = stepper_.bodies();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    places_.position[i] = states[i].position;
+    places_.orientation[i] = states[i].orientation;
+    places_.motion[i].velocity = states[i].velocity;
+    places_.motion[i].angular_velocity = states[i].angular_velocity;
   }
+  at_places_.read_positions(places_);
+  return at_places_.bodies();
 }
 
 void StepScribe::end_part(const contact::StepStage& stage) {
@@ -275,11 +295,8 @@ void StepScribe::end_part(const contact::StepStage& stage) {
   std::string inside = pushes_;
   const bool composed = contacts_.impulses != first_impulses_;
   const double residual = put_contacts(inside, contacts_, as_solved_, solved_);
-  if (hold(now_)) {
-    put_joints(inside, begin_, stage.start, stepper_.joint_impulses(), 0);
-    put_joints(inside, last_, end, stage.joint_impulses_at_end, 1);
-    put_laws(inside, stage.start);
-  }
+  if (hold(now_)) put_pulls(inside, begin_, stage.start, stepper_.joint_impulses());
+  put_laws(inside, stage.start, stage.length);
   Part part;
   part.start = stage.start;
   part.bodies = now_;
@@ -290,6 +307,8 @@ void StepScribe::end_part(const contact::StepStage& stage) {
     if (!same_place(placed_[at(i)], begin_[at(i)]))
       Line(part.text, "placed") << i << placed_[at(i)].position << placed_[at(i)].orientation;
   }
+  const bool pulled = any_of(stage.joint_impulses_at_end, [](double x) { return x != 0; });
+  if (hold(now_) && pulled) put_pulls_at_end(end, stage.joint_impulses_at_end, part);
   reach(end, now_, part.text);
   parts_.push_back(std::move(part));
 }
@@ -302,7 +321,6 @@ void StepScribe::flush() {
                     << stepper_.residual() << (stepper_.succeeded() ? 1 : 0);
   for (const Part& part : parts_) out += part.text;
   parts_.clear();
-  trial_.clear();
   step_ = -1;
   sheet_.put(out);
 }

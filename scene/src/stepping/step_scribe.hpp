@@ -2,14 +2,15 @@
 #pragma once
 
 #include "bounds.hpp"
+#include "certificate/joint_lines.hpp"
 #include "certificate/sheet.hpp"
 #include "stepping_engine.hpp"
 
 namespace tether::scene::stepping {
 
 /// Observes the stages of each sub-step. A sub-step that the stepper takes back is known by the
-/// next one, which begins where that one began; an impact at which a step is cut, and what an
-/// accuracy extrapolates, by the next one, too, which begins elsewhere than the last one ended.
+/// next one, which begins where that one began; an impact at which a step is cut, and what an error
+/// control has moved, by the next one, too, which begins elsewhere than the last one ended.
 class StepScribe final : public certificate::Source {
  public:
   StepScribe(const Scene& scene, contact::Stepper& stepper, certificate::Sheet& sheet);
@@ -43,10 +44,11 @@ class StepScribe final : public certificate::Source {
   bool is_at(double time, const std::vector<int>& bodies) const;
   void put_impact(Part& part);
   bool hold(const std::vector<int>& bodies) const;
-  void put_joints(std::string& out, const std::vector<BodyState>& at, double t,
-                  const std::vector<double>& impulses, int when);
-  void put_laws(std::string& out, double t);
-  void set_places(const std::vector<BodyState>& of);
+  void put_pulls(std::string& out, const std::vector<BodyState>& at, double t,
+                 const std::vector<double>& impulses);
+  void put_pulls_at_end(double t, const std::vector<double>& impulses, Part& part);
+  void put_laws(std::string& out, double t, double dt);
+  const mechanics::Bodies& place(const std::vector<BodyState>& states);
   double put_contacts(std::string& out, const contact::StepContacts& contacts,
                       const std::vector<contact::PointContact>& solved,
                       const std::vector<BodyState>& velocities) const;
@@ -57,15 +59,14 @@ class StepScribe final : public certificate::Source {
   const Scene scene_;
   contact::Stepper& stepper_;
   certificate::Sheet& sheet_;
-  std::unique_ptr<SteppedJoints> joints_;  // null: none
+  std::unique_ptr<SteppedJoints> joints_;                 // null: none
+  std::unique_ptr<certificate::JointLines> joint_lines_;  // as above
   std::vector<int> moving_;
   std::vector<char> held_;      // bodies, by joints
   long step_ = -1;              // that `parts_` belong to
   double began_ = 0;            // s
   std::vector<Reached> chain_;  // by body
   std::vector<Part> parts_;
-  std::vector<std::string> trial_;  // taken back last
-  std::size_t trial_at_ = 0;        // parts before it
 
   // The sub-step that is being taken.
   std::vector<int> now_;                                   // bodies
@@ -76,7 +77,8 @@ class StepScribe final : public certificate::Source {
   contact::StepContacts contacts_;
   std::vector<contact::PointContact> as_solved_;
   contact::JointLaws laws_;
-  contact::BodySet places_;  // positions and orientations, for joints
+  contact::BodySet places_;             // as joints see them
+  mechanics::SteppedBodies at_places_;  // bodies there
 };
 
 }  // namespace tether::scene::stepping

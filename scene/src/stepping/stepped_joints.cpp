@@ -33,21 +33,6 @@ std::vector<JointForce> SteppedJoints::forces(const contact::BodySet& bodies, do
   return out;
 }
 
-std::vector<std::array<Wrench<double>, 2>> SteppedJoints::pulls(
-    const std::vector<double>& impulses) const {
-  std::vector<std::array<Wrench<double>, 2>> out(rows_.joint_count() + rows_.couplings().size(),
-                                                 {no_wrench<double>(), no_wrench<double>()});
-  std::size_t part = rows_.joint_count();
-  rows_.each([&](const auto& row) {
-    constexpr bool couples = std::is_same_v<std::decay_t<decltype(row)>, joints::Relation>;
-    auto& [on_first, on_second] = out[couples ? part++ : at(row.joint)];
-    const Bodies& all = bodies_.bodies();
-    row.pull(all.frames[at(row.first)], all.frames[at(row.second)], impulses.data() + row.row,
-             on_first, on_second);
-  });
-  return out;
-}
-
 void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) {
   bodies_.read_positions(bodies);
   rows_.set_time(t);

@@ -22,15 +22,6 @@ class SteppedJoints final : public contact::JointEquations {
   std::vector<JointForce> forces(const contact::BodySet& bodies, double t,
                                  const std::vector<double>& impulses,
                                  const std::vector<double>& law_impulses, double dt);
-  /// The bodies whose pulls() are asked for.
-  void set_places(const contact::BodySet& bodies, double t) {
-    bodies_.read_positions(bodies);
-    rows_.set_time(t);
-  }
-  /// Impulses, by row, as wrenches on both bodies of each joint, then of each joint of each
-  /// coupling.
-  std::vector<std::array<mechanics::Wrench<double>, 2>> pulls(
-      const std::vector<double>& impulses) const;
   /// Parts the mean tensions of cables that rub.
   void part_tensions(const std::vector<double>& law_impulses, double dt, Forces& out) const {
     laws_.part_tensions(law_impulses, dt, out.springs);
