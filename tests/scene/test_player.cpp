@@ -9,6 +9,7 @@
 #include <tether/scene/files.hpp>
 #include <tether/scene/run.hpp>
 
+#include "picture/canvas.hpp"
 #include "player/film.hpp"
 #include "player/page_text.hpp"
 #include "run_files.hpp"
@@ -166,7 +167,7 @@ TEST_CASE("texts of a scene stay texts on its page") {
   const std::string shown = page.substr(title, page.find("</title>") - title);
   CHECK(shown.find('<') == std::string::npos);
   CHECK(shown.find_first_of("\x1b\x07\n\"'") == std::string::npos);
-  CHECK(player::html_text("a<b> & \xc3\xa4\xff") == "a&#60;b&#62; &#38; \xc3\xa4\xef\xbf\xbd");
+  CHECK(picture::markup_text("a<b> & \xc3\xa4\xff") == "a&#60;b&#62; &#38; \xc3\xa4\xef\xbf\xbd");
 }
 
 TEST_CASE("numbers that JSON lacks are null, base 64 is that of RFC 4648") {

@@ -45,13 +45,10 @@ std::string command_of(const Scene& scene, const CostTable& table, const CostRow
 
 constexpr double kWidth = 560, kHeight = 460;
 
-/// Okabe and Ito: safe for colour-blind readers.
-constexpr std::array<const char*, 4> kMethodColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
-
 /// Shapes tell methods apart where colours do not.
 void draw_mark(Canvas& canvas, CostMethod method, const Vector2d& p) {
   constexpr double r = 4;
-  const std::string colour = kMethodColours[static_cast<std::size_t>(method)];
+  const std::string colour = kColours[static_cast<std::size_t>(method)];
   const Pen edge{"#ffffff", 0.8, ""};
   if (method == CostMethod::steps)
     canvas.polygon(
@@ -104,7 +101,7 @@ std::string cost_picture(const Scene& scene, const CostTable& table, std::option
     auto& curve = curves[static_cast<std::size_t>(row.method)];
     if (curve.empty())
       entries.push_back({fmt::format("{}: {}", name(row.method), setting_name(row.method)),
-                         kMethodColours[static_cast<std::size_t>(row.method)]});
+                         kColours[static_cast<std::size_t>(row.method)]});
     curve.push_back(&row);
     times.push_back(1e3 * row.seconds);
     errors.push_back(std::max(row.error, kLeastError));
@@ -130,7 +127,7 @@ std::string cost_picture(const Scene& scene, const CostTable& table, std::option
     std::vector<Vector2d> points;
     for (const CostRow* row : curve)
       points.emplace_back(1e3 * row->seconds, std::max(row->error, kLeastError));
-    axes.curve(points, {kMethodColours[static_cast<std::size_t>(curve.front()->method)], 1.6, ""});
+    axes.curve(points, {kColours[static_cast<std::size_t>(curve.front()->method)], 1.6, ""});
   }
   if (wanted) draw_level(canvas, axes, x, *wanted, "wanted " + short_number(*wanted), "#b00020");
   if (trust)
@@ -150,16 +147,15 @@ std::string cost_picture(const Scene& scene, const CostTable& table, std::option
 }
 
 std::string cost_page(const Scene& scene, const CostTable& table, std::optional<double> wanted) {
-  using player::html_text;
   std::string rows;
   for (const CostRow& row : table.rows) {
     rows += fmt::format("<tr><td>{}<td>{:g}", name(row.method), row.setting);
     rows += row.failure.empty()
                 ? fmt::format("<td>{:.2e}<td>{:.4g}<td>{}<td>{:.1e}", row.error, 1e3 * row.seconds,
                               row.steps, table.smooth ? row.drift : row.penetration)
-                : "<td class=\"why\" colspan=\"4\">fails: " + html_text(row.failure);
+                : "<td class=\"why\" colspan=\"4\">fails: " + markup_text(row.failure);
     rows += fmt::format("<td class=\"why\"><code>{}</code></tr>\n",
-                        html_text(command_of(scene, table, row)));
+                        markup_text(command_of(scene, table, row)));
   }
   const std::string picture = cost_picture(scene, table, wanted);
   return player::page_head(title_of(scene), player::kCostStyle) +
@@ -167,7 +163,7 @@ std::string cost_page(const Scene& scene, const CostTable& table, std::optional<
              "<p>Errors against {}, which may be off by {:.1e}.</p>\n{}<table><thead><tr>"
              "<th>method<th>setting<th>error<th>time / ms<th>steps<th>{}<th>command</tr></thead>\n"
              "<tbody>\n{}</tbody></table>\n</body>\n</html>\n",
-             html_text(table.reference), table.reference_error,
+             markup_text(table.reference), table.reference_error,
              picture.substr(picture.find("<svg")), table.smooth ? "drift" : "depth / m", rows);
 }
 

@@ -33,18 +33,6 @@ std::vector<std::string> characters(std::string_view text) {
   return out;
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const std::string& c : characters(text)) {
-    const auto first = static_cast<unsigned char>(c.front());
-    if (c == "<" || c == ">" || c == "&" || c == "\"" || c == "'")
-      out += fmt::format("&#{};", first);
-    else
-      out += first < 0x20 || first == 0x7f ? std::string(" ") : c;
-  }
-  return out;
-}
-
 std::string stroke(const Pen& pen) {
   return fmt::format(" stroke=\"{}\" stroke-width=\"{:.3g}\"{}", pen.colour, pen.width,
                      pen.dashes.empty() ? "" : fmt::format(" stroke-dasharray=\"{}\"", pen.dashes));
@@ -122,6 +110,18 @@ std::vector<Tick> ticks(const Range& range, double least) {
 
 }  // namespace
 
+std::string markup_text(const std::string& text) {
+  std::string out;
+  for (const std::string& c : characters(text)) {
+    const auto first = static_cast<unsigned char>(c.front());
+    if (c == "<" || c == ">" || c == "&" || c == "\"" || c == "'")
+      out += fmt::format("&#{};", first);
+    else
+      out += first < 0x20 || first == 0x7f ? std::string(" ") : c;
+  }
+  return out;
+}
+
 double width_of(const std::string& text, double size) {
   return kCharacter * size * static_cast<double>(characters(text).size());
 }
@@ -175,7 +175,7 @@ void Canvas::begin_clip(const Box& box) {
 void Canvas::end_clip() { drawn_ += "</g>\n"; }
 
 void Canvas::begin_note(const std::string& text) {
-  drawn_ += fmt::format("<g><title>{}</title>\n", escaped(text));
+  drawn_ += fmt::format("<g><title>{}</title>\n", markup_text(text));
 }
 
 void Canvas::avoid(const Vector2d& from, const Vector2d& to) {
@@ -204,7 +204,7 @@ bool Canvas::text(const std::string& text, const std::vector<Spot>& places, cons
           "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:.4g}\" text-anchor=\"{}\" "
           "fill=\"{}\">{}</text>\n",
           place.at.x(), place.at.y(), font.size, kAnchors[static_cast<int>(place.anchor)],
-          font.colour, escaped(text));
+          font.colour, markup_text(text));
       return true;
     }
   return false;
@@ -217,7 +217,7 @@ std::string Canvas::svg(const std::string& title) const {
              "width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\" "
              "font-family=\"Helvetica, Arial, sans-serif\">\n<title>{2}</title>\n"
              "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"#ffffff\"/>\n",
-             whole_.right, whole_.bottom, escaped(title), kMarkup) +
+             whole_.right, whole_.bottom, markup_text(title), kMarkup) +
          (drawn_.find("url(#hatch)") == std::string::npos ? "" : kHatch) + drawn_ +
          "<g stroke=\"#ffffff\" stroke-width=\"3\" stroke-linejoin=\"round\" "
          "paint-order=\"stroke\">\n" +

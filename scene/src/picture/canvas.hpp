@@ -47,6 +47,9 @@ struct Font {
 inline constexpr std::array<const char*, 7> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                         "#e69f00", "#56b4e9", "#999999"};
 
+/// Text of an element of SVG or HTML, in UTF-8: bytes that are not become U+FFFD.
+std::string markup_text(const std::string& text);
+
 /// Width of the box of a text.
 double width_of(const std::string& text, double size);
 /// At most that wide: what does not fit becomes three dots.

@@ -2,17 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "page_text.hpp"
 
-#include <cctype>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "output/files.hpp"
+#include "picture/canvas.hpp"
 
 namespace tether::scene::player {
 
 namespace {
-
-using Handler = nlohmann::json::error_handler_t;
 
 std::string base64(const std::string& bytes) {
   constexpr const char* kDigits =
@@ -45,25 +43,13 @@ std::string little_endian(const std::vector<T>& values) {
 
 }  // namespace
 
-std::string html_text(const std::string& text) {
-  const auto valid = nlohmann::json(text).dump(-1, ' ', false, Handler::replace);
-  std::string out;
-  for (const char c : nlohmann::json::parse(valid).get<std::string>()) {
-    if (std::strchr("<>&\"'", c) && c)
-      out += "&#" + std::to_string(int{c}) + ";";
-    else
-      out += std::iscntrl(static_cast<unsigned char>(c)) ? ' ' : c;
-  }
-  return out;
-}
-
 // Outside of strings JSON has none of these characters, and in them each may be written by its
 // code.
 std::string script_text(const nlohmann::json& value) {
   constexpr std::string_view kHtml = "<>&'";
   constexpr const char* kCodes[] = {"\\u003c", "\\u003e", "\\u0026", "\\u0027"};
   std::string out;
-  for (const char c : value.dump(-1, ' ', true, Handler::replace)) {
+  for (const char c : value.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)) {
     const std::size_t at = kHtml.find(c);
     if (at == std::string_view::npos)
       out += c;
@@ -80,7 +66,7 @@ std::string page_head(const std::string& title, std::string_view style) {
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src "
       "'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-      html_text(title) + "</title>\n<style>\n";
+      picture::markup_text(title) + "</title>\n<style>\n";
   out += style;
   return out + "</style>\n</head>\n<body>\n";
 }

@@ -14,9 +14,6 @@ namespace tether::scene::player {
 /// U+FFFD, numbers that JSON lacks null.
 std::string script_text(const nlohmann::json& value);
 
-/// Text of an HTML element, in UTF-8.
-std::string html_text(const std::string& text);
-
 /// The page up to its body. Its policy lets it load nothing and send nothing, whatever its texts
 /// say.
 std::string page_head(const std::string& title, std::string_view style);

@@ -38,11 +38,13 @@ Robot options_of(const ImportArguments& a) {
     out.controls.push_back(read_named("--control", word, "a number"));
   out.held.insert(a.held.begin(), a.held.end());
   out.joint_laws = !a.no_joint_laws;
-  for (const auto& [name, number] : {std::pair{"--height", out.height},
-                                     {"--ground", out.ground.value_or(0)},
-                                     {"--friction", out.friction.value_or(0)}})
+  const auto check = [](const char* name, double number) {
     if (!std::isfinite(number) || std::abs(number) > 1e9)
       throw std::invalid_argument(fmt::format("{} {}: must be a finite number", name, number));
+  };
+  check("--height", out.height);
+  check("--ground", out.ground.value_or(0));
+  check("--friction", out.friction.value_or(0));
   if (out.friction && *out.friction < 0)
     throw std::invalid_argument(fmt::format("--friction {}: must be >= 0", *out.friction));
   return out;
