@@ -177,6 +177,19 @@ TEST_CASE("reverse communication: a start is made consistent by requests, too") 
   CHECK_THROWS_AS(plain.make_consistent(), std::logic_error);
 }
 
+TEST_CASE("reverse communication: one that was moved from throws, the other goes on") {
+  const Problem problem = swing();
+  tr::ReverseIda ida(equations_of(problem, kTolerance, Linear::jacobian, true));
+  tr::ReverseIda other(std::move(ida));
+  CHECK_THROWS_AS(ida.solve(0.2), std::logic_error);  // NOLINT(bugprone-use-after-move)
+  CHECK_THROWS_AS(ida.go_on(), std::logic_error);
+  CHECK_THROWS_AS(ida.message(), std::logic_error);
+  CHECK_THROWS_AS(ida.y(), std::logic_error);
+  CHECK_THROWS_AS(ida.projection(), std::logic_error);
+  Program program(problem);
+  CHECK(program.finish(other, other.solve(0.2)) == Request::reached);
+}
+
 TEST_CASE("reverse communication: answers > 0 shorten a step, answers < 0 end the run") {
   const Problem problem = swing();
   for (const Request which :

@@ -357,3 +357,53 @@ TEST_CASE("run: energy that nothing takes or gives is kept, or the summary says 
     }
   }
 }
+
+// A disc that rolls about its resting centre lost 38 % of the energy of its motion in steps of 5
+// ms, without a word.
+TEST_CASE(
+    "run: steps too long for what rolls are said, and nothing where energy is lost by a law") {
+  const std::string floor =
+      "[[body]]\nname = \"floor\"\nshape = \"plane\"\nfixed = true\nmaterial = \"floor\"\n";
+  const auto warned = [&](double step, double end, const std::string& body,
+                          const std::string& pair) {
+    const std::string scene =
+        "[scene]\nend = " + std::to_string(end) +
+        "\ngravity = [0, 0, -9.81]\n[stepping]\nstep = " + std::to_string(step) + "\n" + floor +
+        "[[body]]\nname = \"b\"\nmass = 0.1\nmaterial = \"b\"\n" + body +
+        "[[pair]]\nbetween = [\"floor\", \"b\"]\n" + pair;
+    std::size_t count = 0;
+    for (const std::string& each : run(parse_scene(scene, "rolling.toml")).warnings)
+      count += each.find("stepping.step is too long for the motion") != std::string::npos;
+    return count == 1;
+  };
+  const std::string disc =
+      "shape = \"cylinder\"\nradius = 0.04\nlength = 0.01\n"
+      "position = [0, 0, 0.018379268836956293]\norientation = { axis = [0, 1, 0], deg = 20 }\n"
+      "angular_velocity = [16.645939336661293, 0, -8.52733067495695]\n";
+  CHECK(warned(5e-3, 2, disc, "friction = 0.8"));
+  CHECK(warned(2e-3, 2, disc, "friction = 0.8"));
+  CHECK_FALSE(warned(1e-3, 2, disc, "friction = 0.8"));
+  const std::string wheel =
+      "shape = \"cylinder\"\nradius = 0.04\nlength = 0.01\nposition = [0, 0, 0.04]\n"
+      "orientation = { axis = [1, 0, 0], deg = 90 }\n";
+  CHECK_FALSE(warned(5e-3, 1, wheel + "velocity = [4, 0, 0]\nangular_velocity = [0, 100, 0]\n",
+                     "friction = 0.8"));  // half a radian a step
+  CHECK_FALSE(warned(5e-3, 1, wheel + "velocity = [4, 0, 0]\n", "friction = 0.2"));  // slips, rolls
+  const std::string box = "shape = \"box\"\nsize = [0.02, 0.05, 0.1]\n";
+  CHECK_FALSE(warned(5e-3, 1, box + "position = [0, 0, 0.05]\nvelocity = [2, 0, 0]\n",
+                     "friction = 0.3"));  // slides
+  CHECK_FALSE(warned(1e-3, 2,
+                     "shape = \"box\"\nsize = [0.1, 0.05, 0.2]\nposition = [0, 0, 0.1]\n"
+                     "angular_velocity = [0, 1.5, 0]\n",
+                     "friction = 0.9"));  // rocks
+  CHECK_FALSE(warned(5e-3, 2, "shape = \"sphere\"\nradius = 0.05\nposition = [0, 0, 0.5]\n",
+                     "friction = 0.3\nrestitution = 0.5"));  // bounces
+  // It tumbles, slides and rolls to rest: what rolling loses falls with the square of the step.
+  const std::string coin =
+      "shape = \"cylinder\"\nradius = 0.04\nlength = 0.03\nposition = [0, 0, 0.1]\n"
+      "angular_velocity = [3, 2, 5]\norientation = { axis = [1, 1, 0], deg = 33 }\n";
+  CHECK(warned(2e-3, 3, coin, "friction = 0.5"));
+  CHECK_FALSE(warned(5e-4, 3, coin, "friction = 0.5"));
+  // Laws that take energy are no errors of steps.
+  CHECK_FALSE(warned(5e-3, 2, disc, "friction = 0.8\nrolling = 0.001"));
+}

@@ -67,7 +67,8 @@ struct Equations {
 ///     }
 ///
 /// IDA runs on a stack of its own (1 MB, Boost.Context); results are those of the same functions
-/// given as callbacks, bit by bit. Not for use by two threads at once.
+/// given as callbacks, bit by bit. Not for use by two threads at once. One that was moved from
+/// throws std::logic_error.
 class ReverseIda {
  public:
   /// Throws std::invalid_argument, naming the argument and its value, std::runtime_error if the

@@ -38,9 +38,7 @@ void validate(const Constraints& constraints, const Options& options, N_Vector l
 /// The parts of a Projection, unless it was moved from.
 template <class Pointer>
 auto& own(const Pointer& impl) {
-  if (!impl)
-    throw std::logic_error("Projection: it was moved from; call the one that it was moved to");
-  return *impl;
+  return owned("Projection", impl);
 }
 
 constexpr double infinite = std::numeric_limits<double>::infinity();

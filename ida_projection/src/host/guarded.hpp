@@ -3,6 +3,7 @@
 #pragma once
 
 #include <exception>
+#include <stdexcept>
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
 
@@ -16,6 +17,15 @@ inline const char* text_of(const std::exception& e) noexcept {
   const char* text = e.what();
   if (text == nullptr) return "an exception whose what() is null";
   return *text != '\0' ? text : "an exception without text";
+}
+
+/// What `owner` points to, unless the object of this class was moved from: then std::logic_error.
+template <class Pointer>
+auto& owned(const char* class_name, const Pointer& owner) {
+  if (!owner)
+    throw std::logic_error(std::string(class_name) +
+                           ": it was moved from; call the one that it was moved to");
+  return *owner;
 }
 
 /// Runs a user callback: no exception leaves it. Returns the callback's int; `message` receives

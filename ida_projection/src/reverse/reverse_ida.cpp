@@ -16,6 +16,7 @@
 #include <sunmatrix/sunmatrix_dense.h>
 #include <tether/reverse_ida.hpp>
 
+#include "host/guarded.hpp"
 #include "host/owned_vector.hpp"
 #include "host/shortest.hpp"
 
@@ -375,24 +376,34 @@ ReverseIda::~ReverseIda() = default;
 ReverseIda::ReverseIda(ReverseIda&&) noexcept = default;
 ReverseIda& ReverseIda::operator=(ReverseIda&&) noexcept = default;
 
-Request ReverseIda::solve(double tout, bool one_step) {
-  return implementation_->solve(tout, one_step);
+namespace {
+
+template <class Pointer>
+auto& its(const Pointer& implementation) {
+  return tp::owned("ReverseIda", implementation);
 }
-Request ReverseIda::make_consistent() { return implementation_->make_consistent(); }
-Request ReverseIda::go_on(int answer) { return implementation_->go_on(answer); }
-Request ReverseIda::request() const { return implementation_->asked_.request; }
-double ReverseIda::t() const { return implementation_->t_; }
-double ReverseIda::cj() const { return implementation_->asked_.cj; }
-const double* ReverseIda::y() const { return implementation_->asked_.y; }
-const double* ReverseIda::yp() const { return implementation_->asked_.yp; }
-const double* ReverseIda::rhs() const { return implementation_->asked_.rhs; }
-double* ReverseIda::result() const { return implementation_->asked_.result; }
-std::size_t ReverseIda::result_size() const { return implementation_->asked_.result_size; }
-int ReverseIda::flag() const { return implementation_->task_.flag; }
-std::string ReverseIda::message() const { return implementation_->task_.message; }
-void* ReverseIda::ida_mem() const { return implementation_->mem_.get(); }
+
+}  // namespace
+
+Request ReverseIda::solve(double tout, bool one_step) {
+  return its(implementation_).solve(tout, one_step);
+}
+Request ReverseIda::make_consistent() { return its(implementation_).make_consistent(); }
+Request ReverseIda::go_on(int answer) { return its(implementation_).go_on(answer); }
+Request ReverseIda::request() const { return its(implementation_).asked_.request; }
+double ReverseIda::t() const { return its(implementation_).t_; }
+double ReverseIda::cj() const { return its(implementation_).asked_.cj; }
+const double* ReverseIda::y() const { return its(implementation_).asked_.y; }
+const double* ReverseIda::yp() const { return its(implementation_).asked_.yp; }
+const double* ReverseIda::rhs() const { return its(implementation_).asked_.rhs; }
+double* ReverseIda::result() const { return its(implementation_).asked_.result; }
+std::size_t ReverseIda::result_size() const { return its(implementation_).asked_.result_size; }
+int ReverseIda::flag() const { return its(implementation_).task_.flag; }
+std::string ReverseIda::message() const { return its(implementation_).task_.message; }
+void* ReverseIda::ida_mem() const { return its(implementation_).mem_.get(); }
 const ida_projection::Projection* ReverseIda::projection() const {
-  return implementation_->projection_ ? &*implementation_->projection_ : nullptr;
+  const auto& projection = its(implementation_).projection_;
+  return projection ? &*projection : nullptr;
 }
 
 }  // namespace tether::reverse_ida

@@ -29,6 +29,15 @@ bool has_joint_laws(const Scene& scene) {
   return any_of(list, [&](const Effect* each) { return each->has_joint_laws(scene); });
 }
 
+bool keeps_energy(const Scene& scene) {
+  return !has_joint_laws(scene) &&
+         !any_of(all(), [&](const Effect* each) { return each->does_work(scene); }) &&
+         !any_of(scene.joints, [](const Joint& each) { return each.window.has_value(); }) &&
+         !any_of(scene.bodies, [](const Body& each) { return each.surface.has_value(); }) &&
+         !any_of(scene.pairs,
+                 [](const Pair& each) { return each.rolling > 0 || each.torsional > 0; });
+}
+
 std::vector<double> kinks_of(const Scene& scene) {
   std::vector<double> times;
   for (const Effect* each : all()) each->add_kinks(scene, times);

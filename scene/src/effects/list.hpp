@@ -16,6 +16,10 @@ std::vector<std::unique_ptr<mechanics::Force>> make_forces(const Scene& scene,
 /// Whether joints have limits, motors or friction, which stepping alone has.
 bool has_joint_laws(const Scene& scene);
 
+/// Whether only weight, springs without damping, joints without laws, and contacts act, of which
+/// those that stick and roll do no work: what they leave of the energy is an error.
+bool keeps_energy(const Scene& scene);
+
 /// When forces have kinks or jump: in order, each once, after t = 0.
 std::vector<double> kinks_of(const Scene& scene);
 

@@ -64,20 +64,9 @@ std::unique_ptr<Engine> engine_of(const Scene& scene, const Plan& plan, contact:
       word(plan.engine), plan.why));
 }
 
-// Resolved motions change the energy by some tolerances.
-constexpr double kEnergyChange = 0.1;     // of the largest kinetic energy
-constexpr double kEnergyRounding = 1e-6;  // of energies whose sum is small
-
-/// Whether only weight, springs without damping and joints without laws act between bodies that
-/// nothing touches: the energy stays what it is.
-bool keeps_energy(const Scene& scene, const Plan& plan) {
-  if (plan.engine == EngineKind::stepping || plan.pairs > 0 || effects::has_joint_laws(scene))
-    return false;
-  const auto changes = [](const Joint& joint) { return joint.window.has_value(); };
-  return !any_of(scene.joints, changes) &&
-         !any_of(effects::all(),
-                 [&](const effects::Effect* each) { return each->does_work(scene); });
-}
+// Resolved motions change the energy by some tolerances, and by little in steps that roll or stick.
+constexpr double kEnergyChange = 0.1, kEnergyInSteps = 0.01;  // of the largest kinetic energy
+constexpr double kEnergyRounding = 1e-6;                      // of energies whose sum is small
 
 /// One run from its start, or from a saved state, to the end.
 class Run {
@@ -268,13 +257,19 @@ class Run {
   // Tolerances are of places: a motion that is smaller than they, as on a very stiff spring, may
   // take or give any energy.
   void warn_of_energy() {
-    if (!keeps_energy(scene_, plan_)) return;
-    const double change = std::max(summary().largest_change, -summary().lowest_change);
-    if (change > kEnergyChange * most_kinetic_ && change > kEnergyRounding * most_energy_)
-      result_.warnings.push_back(fmt::format(
-          "the energy changes by {:.2g} J, of at most {:.2g} J of motion, though nothing takes or "
-          "gives any: the tolerance does not resolve the motion",
-          change, most_kinetic_));
+    const auto warn = [this](double change, double part, const char* why) {
+      if (std::abs(change) > part * most_kinetic_ &&
+          std::abs(change) > kEnergyRounding * most_energy_)
+        result_.warnings.push_back(
+            fmt::format("the energy changes by {:.2g} J, of at most {:.2g} J of motion, {}", change,
+                        most_kinetic_, why));
+    };
+    if (plan_.engine == EngineKind::stepping)
+      warn(diagnostics_.energy_error, kEnergyInSteps,
+           "in steps in which nothing strikes or slips: stepping.step is too long for the motion");
+    else if (plan_.pairs == 0 && effects::keeps_energy(scene_))
+      warn(std::max(summary().largest_change, -summary().lowest_change), kEnergyChange,
+           "though nothing takes or gives any: the tolerance does not resolve the motion");
   }
 
   // Within its own limit a residual is said by the summary alone.

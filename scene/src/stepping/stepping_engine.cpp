@@ -195,6 +195,7 @@ SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
   if (scene.certificate)
     scribe_ = std::make_unique<StepScribe>(scene, stepper_, *scene.certificate);
   if (scene.start) begin_at(scene.start->time, scene.start->bodies);
+  watch_energy(scene);
   read_bodies();
 }
 
@@ -244,6 +245,21 @@ void SteppingEngine::step() {
     throw SimulationError(
         fmt::format("t = {:g} s: the motion has left the range of numbers: {}", time(), e.what()));
   }
+  if (energy_error_) energy_error_->add(stepper_.bodies(), stepper_.contacts());
+}
+
+void SteppingEngine::watch_energy(const Scene& scene) {
+  const auto acts = [](const auto& force) {
+    return force->stepping() != mechanics::Force::Stepping::by_contact;
+  };
+  const bool springs = any_of(forces_, acts) || (joints_ != nullptr && joints_->has_laws());
+  if (springs || !effects::keeps_energy(scene) || stepper_.options().accuracy > 0) return;
+  std::vector<char> joined(scene.bodies.size(), 0);
+  for (const Joint& joint : scene.joints)
+    for (const int body : {joint.first, joint.second})
+      if (body >= 0) joined[static_cast<std::size_t>(body)] = 1;
+  energy_error_.emplace(scene.gravity.value_or(Vector3d::Zero()), stepper_.options().step,
+                        std::move(joined), stepper_.bodies());
 }
 
 void SteppingEngine::report_failure() const {
@@ -291,6 +307,7 @@ Diagnostics SteppingEngine::diagnostics() const {
   d.kinetic_energy = contact::kinetic_energy(b);
   stepped_.read_positions(b);
   for (const auto& force : forces_) d.potential_energy += force->potential(stepped_.bodies());
+  if (energy_error_) d.energy_error = energy_error_->sum();
   d.momentum = contact::momentum(b);
   d.angular_momentum = contact::angular_momentum(b);
   d.contacts = static_cast<int>(stepper_.contacts().points.size());
@@ -384,6 +401,7 @@ void SteppingEngine::set_bodies(const std::vector<BodyState>& states) {
     b.motion[i].velocity = states[i].velocity;
     b.motion[i].angular_velocity = states[i].angular_velocity;
   }
+  if (energy_error_) energy_error_->begin_at(b);
 }
 
 // Goes on from what another engine saved.

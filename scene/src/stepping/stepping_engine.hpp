@@ -2,6 +2,7 @@
 #pragma once
 
 #include "effects/list.hpp"
+#include "energy_error.hpp"
 #include "joints/coordinate.hpp"
 #include "joints/joint_rows.hpp"
 #include "mechanics/force.hpp"
@@ -90,6 +91,7 @@ class SteppingEngine final : public Engine {
  private:
   SteppingEngine(const Scene& scene, Mapped mapped);
   void step();
+  void watch_energy(const Scene& scene);
   void take_step();
   void report_failure() const;
   void read_bodies();
@@ -108,8 +110,9 @@ class SteppingEngine final : public Engine {
   std::vector<BodyState> bodies_;
   std::vector<SurfaceSpeed> surface_;  // by body; empty: none moves on its body
   mutable std::vector<ContactState> contacts_;
-  mutable long contacts_of_ = -1;       // step that contacts_ belongs to
-  std::unique_ptr<StepScribe> scribe_;  // only with Scene::certificate
+  mutable long contacts_of_ = -1;            // step that contacts_ belongs to
+  std::unique_ptr<StepScribe> scribe_;       // only with Scene::certificate
+  std::optional<EnergyError> energy_error_;  // only where nothing else changes it
 };
 
 }  // namespace tether::scene::stepping

@@ -88,7 +88,8 @@ struct Consistency {
 /// without it fails (IDA_NLS_FAIL, before the first step IDA_NLS_INIT_FAIL). A nonlinear solver
 /// that the host attaches later replaces it silently. status(), message(), statistics(), IDAFree
 /// and the destructor therefore compare IDA's steps with the calls that the plugin has had. A
-/// difference is printed once to stderr (Options::print).
+/// difference is printed once to stderr (Options::print). One that was moved from throws
+/// std::logic_error.
 ///
 /// One call to add, after IDAInit and before IDACalcIC and the first IDASolve:
 ///

@@ -103,6 +103,9 @@ struct Diagnostics {
   int contacts = 0;        ///< closed ones; stepping: all points of the last step
   double penetration = 0;  ///< m, deepest
   double residual = 0;     ///< of the last contact problem
+  /// Stepping: what steps in which nothing strikes or slips have changed of the energy, where only
+  /// weight and joints without laws act, J.
+  double energy_error = 0;
 };
 
 /// Work of an engine since the start.
