@@ -19,7 +19,7 @@ inline const char* text_of(const std::exception& e) noexcept {
   return *text != '\0' ? text : "an exception without text";
 }
 
-/// What `owner` points to, unless the object of this class was moved from: then std::logic_error.
+/// The parts of an object of this class. Throws std::logic_error if it was moved from.
 template <class Pointer>
 auto& owned(const char* class_name, const Pointer& owner) {
   if (!owner)

@@ -13,7 +13,7 @@ namespace {
 // A normal impulse that changes by more from step to step is one of an impact, or of a force that
 // the steps do not resolve.
 constexpr double kSteady = 2;
-// Of the largest friction: what has more slips, at the start or the end of the step.
+// A contact with more of its largest friction may slip in a part of the step.
 constexpr double kHolds = 0.99;
 
 }  // namespace
