@@ -73,9 +73,9 @@ With torsional 6: normal, tangents, moment about the normal, two across it.)")
       });
 }
 
-void bind_problem(py::module_& module) {
+py::class_<tc::ConeProblem> bind_problem(py::module_& module) {
   using namespace py::literals;
-  py::class_<tc::ConeProblem>(module, "ConeProblem", R"(w = A x - b over a product of cones.
+  return py::class_<tc::ConeProblem>(module, "ConeProblem", R"(w = A x - b over a product of cones.
 
 A: (n, n) array or scipy.sparse matrix, b: (n,), cones: list of Cone whose rows add up to n, in
 their order; compliance: (n,) velocity over impulse of each row, >= 0, added to the diagonal of A.
@@ -104,7 +104,12 @@ bias: (n,).)")
           "A", [](const tc::ConeProblem& p) { return Eigen::MatrixXd(p.dense_matrix()); },
           "with the compliance")
       .def_property_readonly(
-          "b", [](const tc::ConeProblem& p) { return Eigen::VectorXd(p.b()); }, "(n,), by row")
+          "b", [](const tc::ConeProblem& p) { return Eigen::VectorXd(p.b()); }, "(n,), by row");
+}
+
+void bind_laws(py::class_<tc::ConeProblem>& problem) {
+  using namespace py::literals;
+  problem
       .def(
           "residuals",
           [](const tc::ConeProblem& p, const Array& impulses, const std::string& law) {
@@ -144,7 +149,8 @@ status, with advice.)");
 
 void bind_cones(py::module_& module) {
   bind_cone(module);
-  bind_problem(module);
+  py::class_<tc::ConeProblem> problem = bind_problem(module);
+  bind_laws(problem);
   using namespace py::literals;
   bind_solution<tc::ConeSolution>(module, "ConeSolution",
                                   "residuals[\"error\"], which is compared with the tolerance")

@@ -65,13 +65,8 @@ py::dict prove(const tc::Problem& problem, const Array& impulses, double allowed
                   "contact"_a = p.contact, "reason"_a = p.reason);
 }
 
-}  // namespace
-
-void bind_contact(py::module_& module) {
+void bind_matrix_problem(py::module_& module) {
   using namespace py::literals;
-  module.doc() =
-      "Frictional contact: w = A x - b, impulses x in the friction cones, A = J M^-1 J'.";
-
   py::class_<tc::Problem>(module, "Problem", R"(A contact problem (A, b, mu).
 
 A: (d n, d n) array or scipy.sparse matrix in 1/kg, b: (d n,) in m/s, mu: (n,), with d = 3
@@ -119,7 +114,15 @@ this (relative) are listed. Raises ValueError where the impulses are no solution
 law: maximum_dissipation (Preclik and Ruede), coulomb or frictionless. tolerance: of the relative
 error in velocity. start: impulses to begin with. max_work: about nanoseconds. strict: never
 replace the law at single contacts. What cannot be solved is a status, with advice.)");
+}
 
+}  // namespace
+
+void bind_contact(py::module_& module) {
+  using namespace py::literals;
+  module.doc() =
+      "Frictional contact: w = A x - b, impulses x in the friction cones, A = J M^-1 J'.";
+  bind_matrix_problem(module);
   bind_solution<tc::Solution>(module, "Solution",
                               "residuals[\"fixed_point\"], which is compared with the tolerance")
       .def_property_readonly(

@@ -123,7 +123,7 @@ struct Ida {
     }
   } memory;
 
-  scene::OwnedVector vector(const Array& values) {
+  scene::OwnedVector owned(const Array& values) {
     scene::OwnedVector v(N_VNew_Serial(values.size(), context));
     if (!v) throw std::bad_alloc();
     std::copy(values.data(), values.data() + values.size(), N_VGetArrayPointer(v.get()));
@@ -136,6 +136,32 @@ struct Ida {
     const std::string text = std::string(function) + ": " + word + ". " + context.message();
     std::free(word);
     throw std::runtime_error(text);
+  }
+
+  /// From y and yp on, with the tolerances and a dense solver.
+  void set_up(System& system, double begin, double rtol, const py::object& tolerances,
+              long max_steps, bool has_jacobian) {
+    const auto n = static_cast<py::ssize_t>(N_VGetLength(y.get()));
+    tp::fast_vector(y.get(), yp.get());
+    memory.ida = IDACreate(context);
+    void* const mem = memory.ida;
+    if (!mem) throw std::bad_alloc();
+    context.keep_messages_of(mem);
+    need(IDAInit(mem, System::residual, begin, y.get(), yp.get()), "IDAInit");
+    if (py::isinstance<py::float_>(tolerances) || py::isinstance<py::int_>(tolerances)) {
+      need(IDASStolerances(mem, rtol, tolerances.cast<double>()), "tolerances");
+    } else {
+      atol = owned(vector("atol", tolerances, n));
+      need(IDASVtolerances(mem, rtol, atol.get()), "tolerances");
+    }
+    need(IDASetUserData(mem, &system), "IDASetUserData");
+    need(IDASetMaxNumSteps(mem, max_steps), "IDASetMaxNumSteps");
+    matrix.reset(SUNDenseMatrix(n, n, context));
+    if (!matrix) throw std::bad_alloc();
+    solver.reset(SUNLinSol_Dense(y.get(), matrix.get(), context));
+    if (!solver) throw std::bad_alloc();
+    need(IDASetLinearSolver(mem, solver.get(), matrix.get()), "IDASetLinearSolver");
+    if (has_jacobian) need(IDASetJacFn(mem, System::jacobian), "IDASetJacFn");
   }
 };
 
@@ -151,83 +177,36 @@ struct Result {
   }
 };
 
-Result solve_equations(const py::object& residual, const Array& times, const py::object& y0,
-                       const py::object& yp0, const py::object& g, const py::object& C,
-                       const py::object& jacobian, double rtol, const py::object& atol,
-                       const py::object& algebraic, long max_steps, bool make_consistent) {
+void check_times(const Array& times) {
   if (times.ndim() != 1 || times.size() < 2)
     refuse("times has shape " + shape(times) + ", must be a vector of at least two");
   for (py::ssize_t i = 0; i < times.size(); ++i)
     if (!std::isfinite(times.at(i)) || (i > 0 && !(times.at(i) > times.at(i - 1))))
       refuse("times[" + std::to_string(i) + "] = " + shown(times.at(i)) +
              ", must be finite and rise");
-  const auto begin = numbers("y0", y0);
-  const py::ssize_t n = begin.size();
-  if (n == 0) refuse("y0 is empty");
-  if (!(rtol >= 0) || !std::isfinite(rtol)) refuse("rtol = " + shown(rtol) + ", must be >= 0");
-  if (max_steps < 1) refuse("max_steps = " + std::to_string(max_steps) + ", must be at least 1");
-  const Array start = vector("y0", y0, n);
+}
 
-  Result result;
-  result.unknowns = n;
-  System system(residual, jacobian, n);
-  std::optional<tp::Projection> projection;  // after IDA is freed
-  Ida ida;
-  ida.y = ida.vector(start);
-  ida.yp = ida.vector(vector("yp0", yp0, n));
-  tp::fast_vector(ida.y.get(), ida.yp.get());
-  ida.memory.ida = IDACreate(ida.context);
-  void* memory = ida.memory.ida;
-  if (!memory) throw std::bad_alloc();
-  ida.context.keep_messages_of(memory);
-  ida.need(IDAInit(memory, System::residual, times.at(0), ida.y.get(), ida.yp.get()), "IDAInit");
-  if (py::isinstance<py::float_>(atol) || py::isinstance<py::int_>(atol)) {
-    ida.need(IDASStolerances(memory, rtol, atol.cast<double>()), "tolerances");
-  } else {
-    ida.atol = ida.vector(vector("atol", atol, n));
-    ida.need(IDASVtolerances(memory, rtol, ida.atol.get()), "tolerances");
-  }
-  ida.need(IDASetUserData(memory, &system), "IDASetUserData");
-  ida.need(IDASetMaxNumSteps(memory, max_steps), "IDASetMaxNumSteps");
-  ida.matrix.reset(SUNDenseMatrix(n, n, ida.context));
-  if (!ida.matrix) throw std::bad_alloc();
-  ida.solver.reset(SUNLinSol_Dense(ida.y.get(), ida.matrix.get(), ida.context));
-  if (!ida.solver) throw std::bad_alloc();
-  ida.need(IDASetLinearSolver(memory, ida.solver.get(), ida.matrix.get()), "IDASetLinearSolver");
-  if (!jacobian.is_none()) ida.need(IDASetJacFn(memory, System::jacobian), "IDASetJacFn");
+void make_start_consistent(tp::Projection& projection, System& system, Ida& ida, double begin) {
+  tp::Consistency how;
+  how.residual = System::residual;
+  how.user_data = &system;
+  const tp::ConsistencyReport report =
+      projection.make_consistent(begin, ida.y.get(), ida.yp.get(), how);
+  system.rethrow();
+  if (!report)
+    throw std::runtime_error(std::string("make_consistent: ") + to_string(report.status) + ": " +
+                             report.message);
+}
 
-  tp::Options options;
-  options.print = false;
-  if (!algebraic.is_none()) {
-    const Array marks = vector("algebraic", algebraic, n);
-    Array id(n);
-    for (py::ssize_t i = 0; i < n; ++i) id.mutable_at(i) = marks.at(i) != 0 ? 0.0 : 1.0;
-    ida.id = ida.vector(id);
-    ida.need(IDASetId(memory, ida.id.get()), "IDASetId");
-    options.id = ida.id.get();
-  }
-  if (!g.is_none()) {
-    projection.emplace(memory, constraints(system, g, C, times.at(0), start), options);
-    if (make_consistent) {
-      tp::Consistency how;
-      how.residual = System::residual;
-      how.user_data = &system;
-      const tp::ConsistencyReport report =
-          projection->make_consistent(times.at(0), ida.y.get(), ida.yp.get(), how);
-      system.rethrow();
-      if (!report)
-        throw std::runtime_error(std::string("make_consistent: ") + to_string(report.status) +
-                                 ": " + report.message);
-    }
-  } else if (make_consistent) {
-    refuse("make_consistent = True needs constraints");
-  }
-
+/// Goes from time to time, as far as IDA comes.
+void advance(Ida& ida, System& system, tp::Projection* projection, const Array& times,
+             Result& result) {
+  void* const memory = ida.memory.ida;
   const auto keep = [&](double t) {
     result.t.push_back(t);
     const double *y = N_VGetArrayPointer(ida.y.get()), *yp = N_VGetArrayPointer(ida.yp.get());
-    result.y.insert(result.y.end(), y, y + n);
-    result.yp.insert(result.yp.end(), yp, yp + n);
+    result.y.insert(result.y.end(), y, y + result.unknowns);
+    result.yp.insert(result.yp.end(), yp, yp + result.unknowns);
   };
   keep(times.at(0));
   for (py::ssize_t i = 1; i < times.size(); ++i) {
@@ -246,6 +225,46 @@ Result solve_equations(const py::object& residual, const Array& times, const py:
   }
   IDAGetNumSteps(memory, &result.steps);
   IDAGetNumResEvals(memory, &result.residuals);
+}
+
+Result solve_equations(const py::object& residual, const Array& times, const py::object& y0,
+                       const py::object& yp0, const py::object& g, const py::object& C,
+                       const py::object& jacobian, double rtol, const py::object& atol,
+                       const py::object& algebraic, long max_steps, bool make_consistent) {
+  check_times(times);
+  const auto begin = numbers("y0", y0);
+  const py::ssize_t n = begin.size();
+  if (n == 0) refuse("y0 is empty");
+  if (!(rtol >= 0) || !std::isfinite(rtol)) refuse("rtol = " + shown(rtol) + ", must be >= 0");
+  if (max_steps < 1) refuse("max_steps = " + std::to_string(max_steps) + ", must be at least 1");
+  const Array start = vector("y0", y0, n);
+
+  Result result;
+  result.unknowns = n;
+  System system(residual, jacobian, n);
+  std::optional<tp::Projection> projection;  // after IDA is freed
+  Ida ida;
+  ida.y = ida.owned(start);
+  ida.yp = ida.owned(vector("yp0", yp0, n));
+  ida.set_up(system, times.at(0), rtol, atol, max_steps, !jacobian.is_none());
+
+  tp::Options options;
+  options.print = false;
+  if (!algebraic.is_none()) {
+    const Array marks = vector("algebraic", algebraic, n);
+    Array id(n);
+    for (py::ssize_t i = 0; i < n; ++i) id.mutable_at(i) = marks.at(i) != 0 ? 0.0 : 1.0;
+    ida.id = ida.owned(id);
+    ida.need(IDASetId(ida.memory.ida, ida.id.get()), "IDASetId");
+    options.id = ida.id.get();
+  }
+  if (!g.is_none()) {
+    projection.emplace(ida.memory.ida, constraints(system, g, C, times.at(0), start), options);
+    if (make_consistent) make_start_consistent(*projection, system, ida, times.at(0));
+  } else if (make_consistent) {
+    refuse("make_consistent = True needs constraints");
+  }
+  advance(ida, system, projection ? &*projection : nullptr, times, result);
   if (projection) {
     result.status = to_string(projection->status());
     if (!projection->message().empty())

@@ -98,12 +98,8 @@ py::list events(const Film& film) {
   return list;
 }
 
-}  // namespace
-
-void bind_scene(py::module_& module) {
+void bind_run(py::module_& module) {
   using namespace py::literals;
-  module.doc() = "Rigid bodies in motion, from scene files. SI units, world axes.";
-
   py::class_<Film> film(module, "Run", R"(The records of a run.
 
 t: (T,); position, velocity, angular_velocity: (T, bodies, 3); orientation: (T, bodies, 4) as
@@ -143,6 +139,14 @@ w, x, y, z; energy, drift, penetration, residual, contacts: (T,).)");
           "warnings", [](const Film& f) { return f.result.warnings; },
           "Why the motion is not to be trusted; empty: nothing was seen.")
       .def_property_readonly("counts", &counts, "work of the engine: a dict");
+}
+
+}  // namespace
+
+void bind_scene(py::module_& module) {
+  using namespace py::literals;
+  module.doc() = "Rigid bodies in motion, from scene files. SI units, world axes.";
+  bind_run(module);
 
   py::class_<ts::Scene>(module, "Scene", "A scene: every default filled in.")
       .def_readonly("name", &ts::Scene::name, "title of the scene")
