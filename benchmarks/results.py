@@ -34,10 +34,13 @@ COMMANDS = {
                       "--skip four_bar,long,chain_of_100 | sed -n '/^CPU at equal error/,$p'"),
     "dae_set": ("The DAE problems of SciMLBenchmarks",
                 "Fourteen problems, each first in the form in which IDA is given it there; IDA refuses index 3. The first table counts "
-                "the tolerances at which a run ends, and compares Tether with the variant of IDA that has more digits: digits gained, "
-                "evaluations of F and time over IDA's. A cell of the others: significant digits of the worst component, steps, "
-                "evaluations of F, processor time in ms; \"limit\": beyond 12 s; more than 300000 steps fail. References: `examples/problems`. No NAND gate of theirs: it lacks the capacities of the "
-                "published one, which runs here.",
+                "the tolerances at which a run ends, and in parentheses those at which it has the digits asked less one. It compares "
+                "Tether with the variant of IDA that has more digits: digits gained, evaluations of F and time over IDA's. A cell of the "
+                "others: significant digits of the worst component, steps, evaluations of F, processor time in ms; \"limit\": beyond "
+                "12 s; more than 300000 steps fail. Digits are relative: where a problem has no units of its own, absolute tolerances "
+                "are in those of the reference's components, from 1e-4 to 1. Where digits are missing all codes lack them, RADAU5 too: "
+                "errors of single steps, which tolerances bound, add up. References: `examples/problems`. No NAND gate of theirs: it "
+                "lacks the capacities of the published one, which runs here.",
                 f"{BUILT}/accuracy/dae_set --repeats 1 --seconds 12 --svg benchmarks/results/dae_set"),
     "crossover": ("Where RADAU5's advantage on small smooth problems ends",
                   "Time and evaluations of F of Tether over those of RADAU5: below 1 Tether needs less.",

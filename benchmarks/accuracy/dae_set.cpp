@@ -68,14 +68,30 @@ Runs run_all(const tether::problems::Problem& problem, const Codes& codes,
   return runs;
 }
 
-std::string solved(const std::vector<Cell>& cells) {
+// Tolerances at which it ends, and of these with the digits asked less one.
+std::string solved(const std::vector<Cell>& cells, const std::vector<double>& tolerances) {
   if (cells.empty() || !cells.front().ran) return "-";
-  return fmt::format(
-      "{}", std::count_if(cells.begin(), cells.end(), [](const Cell& c) { return c.good(); }));
+  int ends = 0, exact = 0;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    ends += cells[k].good();
+    exact += cells[k].good() && cells[k].digits >= -std::log10(tolerances[k]) - 1.0;
+  }
+  return fmt::format("{} ({})", ends, exact);
+}
+
+// Digits are relative: absolute tolerances are in the unit of each component, unless the problem
+// has units of its own. Those far below the others are noise.
+void set_units(tether::problems::Problem& problem) {
+  const double smallest = 1e-4;
+  if (!problem.atol_scale.empty()) return;
+  problem.atol_scale.assign(static_cast<std::size_t>(problem.size), 1.0);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(problem.error_components); ++k)
+    if (std::isfinite(problem.reference[k]))
+      problem.atol_scale[k] = std::clamp(std::abs(problem.reference[k]), smallest, 1.0);
 }
 
 // Digits, F and time of ours beside the variant of IDA with more digits, where both run.
-std::vector<std::string> summary(const Runs& runs) {
+std::vector<std::string> summary(const Runs& runs, const std::vector<double>& tolerances) {
   const auto &ours = runs.at("Tether"), &one = runs.at("IDA"), &other = runs.at("IDA suppressed");
   double digits = 0.0;
   GeometricMean evaluations, time;
@@ -106,9 +122,10 @@ std::vector<std::string> summary(const Runs& runs) {
   const auto ratio = [&](const GeometricMean& of) {
     return both > 0 ? fmt::format("{:.2f}", of.value()) : std::string("-");
   };
-  return {solved(one),
-          solved(other),
-          solved(ours),
+  return {solved(one, tolerances),
+          solved(other, tolerances),
+          solved(ours, tolerances),
+          solved(runs.at("RADAU5"), tolerances),
           both > 0 ? fmt::format("{:+.1f}", digits) : "-",
           ratio(evaluations),
           ratio(time),
@@ -156,8 +173,8 @@ int run(const std::vector<Case>& cases, const std::vector<double>& tolerances, d
 
   const Limits limits{300000, seconds};
   const Codes codes = wanted_codes();
-  std::string table = head({"problem", "form", "IDA", "IDA suppressed", "Tether", "digits", "F",
-                            "time", "Tether beside IDA"});
+  std::string table = head({"problem", "form", "IDA", "IDA suppressed", "Tether", "RADAU5",
+                            "digits", "F", "time", "Tether beside IDA"});
   std::string details;
   for (const Case& which : cases) {
     fmt::print(stderr, "{}\n", which.name);
@@ -166,11 +183,12 @@ int run(const std::vector<Case>& cases, const std::vector<double>& tolerances, d
     columns.insert(columns.end(), kColumns.begin(), kColumns.end());
     std::string rows;
     std::vector<Point> points;
-    for (const auto& problem : which.forms) {
+    for (tether::problems::Problem problem : which.forms) {
+      set_units(problem);
       Runs runs = run_all(problem, codes, tolerances, limits, repeats);
       for (const std::string& column : kColumns) runs[column].resize(tolerances.size());
       std::vector<std::string> cells = {which.name, problem.form};
-      for (std::string& cell : summary(runs)) cells.push_back(std::move(cell));
+      for (std::string& cell : summary(runs, tolerances)) cells.push_back(std::move(cell));
       table += line(cells);
       for (std::size_t k = 0; k < tolerances.size(); ++k) {
         cells = {problem.form, fmt::format("{:.0e}", tolerances[k])};
