@@ -15,6 +15,7 @@
 
 #include "bounds.hpp"
 #include "joints/window_rules.hpp"
+#include "lists.hpp"
 #include "output/binary.hpp"
 #include "switching.hpp"
 
