@@ -104,7 +104,7 @@ class Judge:
             self.expect("joints hold", abs(now), arm, row.text)
             self.expect("joints' velocities", abs(after - before) / (2 * h), (1 + speed) * arm, row.text)
             size = sum(abs(a) + (abs(alpha) + s.w @ s.w) * reach for s, (a, alpha) in zip(states, of))
-            self.expect("joints' accelerations", abs(after - 2 * now + before) / (h * h) if rates else 0.0, size, row.text, 1e-6)
+            self.expect("joints' accelerations", abs(after - 2 * now + before) / (h * h) if rates else 0.0, size, row.text, 1e-6 + AT_REST * arm / (h * h))
 
     def loads(self, dt, contacts):
         """What acts on bodies, with or without contacts: impulses and moments, of an instant (dt 1) forces."""

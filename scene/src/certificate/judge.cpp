@@ -51,7 +51,7 @@ const std::map<std::string_view, double> kLaws = {{"time goes on", 1e-9},
 
 constexpr double kSameTime = 1e-12;   // s
 constexpr double kRounding = 1e-9;    // of places and speeds
-constexpr double kAtRest = 1e-15;     // m/s, rad/s
+constexpr double kAtRest = 1e-15;     // m, m/s, rad/s: round-off
 constexpr double kErrorControl = 10;  // parts of the accuracy that it moves a body by
 constexpr std::size_t kFaultsTold = 10;
 
@@ -200,7 +200,7 @@ class Judge {
       expect("joints' velocities", std::abs(after - before) / (2 * h), (1 + speed) * arm, row.name);
       if (rates != nullptr)
         expect("joints' accelerations", std::abs(after - 2 * now + before) / (h * h),
-               size + spins * row.reach(), row.name, 1e-6);
+               size + spins * row.reach(), row.name, 1e-6 + kAtRest * arm / (h * h));
     }
   }
 
