@@ -126,6 +126,7 @@ TEST_CASE("joints and contact: rolling friction in parts that keep an accuracy, 
     CHECK(std::abs(engine->bodies()[0].position.x() + v * v / (2 * a)) < 10 * accuracy);
     CHECK(engine->bodies()[0].velocity.norm() < 1e-7);
     CHECK(engine->counts().unsolved == 0);
-    CHECK(engine->counts().contact_problems < 4000);
+    // Near 1e-5 most accuracies take 3000, a third of them up to a half more.
+    CHECK(engine->counts().contact_problems < 4500);
   }
 }

@@ -158,6 +158,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     id_ = id;
     return structure(candidate.t, id);
   }
+  bool keeps_blocks() const override { return rows_.keeps_blocks(); }
   void accept() override { metric_.accept(); }
   void forget() {
     factors = Factors::none;

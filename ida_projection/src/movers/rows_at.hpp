@@ -113,6 +113,8 @@ class RowsAt {
   virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
     return Status::success;
   }
+  /// Whether no C that is evaluated later can ask for other blocks than set_algebraic() found.
+  virtual bool keeps_blocks() const { return true; }
   /// The attempt that used the last candidate was accepted: its scale is kept.
   virtual void accept() {}
   /// From the next move on: one scale for all unknowns of a level (row_levels.hpp), or a scale for

@@ -187,6 +187,8 @@ class SplitRows {
       solve_blocks(g);
   }
   bool drops_rows() const;
+  /// Whether inspect() has nothing to look for.
+  bool keeps_blocks() const { return watched_.empty() && mixed_.empty(); }
   /// dy of every column that moves.
   template <class Body>
   void for_moves(Body&& body) {

@@ -25,6 +25,7 @@ void PointProjection::begin(N_Vector y, N_Vector weights) {
     rows_ = make_rows(constraints_, options_, statistics_, y);
     for (OwnedVector* each : {&correction_, &weights_, &from_, &dy_}) *each = OwnedVector(y);
   }
+  rows_->reset();
   N_VConst(0.0, correction_);
   N_VScale(1.0, weights, weights_);
   if (!has_values(constraints_)) return;
@@ -33,8 +34,8 @@ void PointProjection::begin(N_Vector y, N_Vector weights) {
     if (!(w[i] > 0.0)) w[i] = 1.0 / std::max(1.0, std::abs(N_VGetArrayPointer(y)[i]));
 }
 
-// Output points come one after the other: what can move stays, and entries that were zero so far
-// are met by the evaluation of C.
+// Output points come one after the other: what can move stays. Blocks that depend on the entries
+// which differed from zero so far are found anew: a point owes nothing to those before it.
 Status PointProjection::arrange(const Candidate& point, const std::vector<bool>& hold,
                                 N_Vector id) {
   if (!has_values(constraints_)) return Status::success;
@@ -47,7 +48,7 @@ Status PointProjection::arrange(const Candidate& point, const std::vector<bool>&
       held.resize(n, false);
       held[i] = true;
     }
-  if (mask == id_ && held == options_.hold) return Status::success;
+  if (mask == id_ && held == options_.hold && rows_->keeps_blocks()) return Status::success;
   options_.hold = held;
   const Status status = rows_->set_algebraic(point, id);
   if (status == Status::success)

@@ -16,9 +16,9 @@ namespace {
 constexpr double kLeastShare = 1.0 / 3.0;  // of factor_kept()
 // Factors of A A^T determine the square of a larger sine to a relative error of 1e-10.
 constexpr double kLeastSine = 1e-3;
-// A unit row of which less is left has lost digits and is orthogonalised twice ("twice is enough":
-// Parlett, The Symmetric Eigenvalue Problem, 6.9).
-constexpr double kTwice = 0.1;
+// A unit row of which less is left is orthogonalised twice ("twice is enough": Parlett, The
+// Symmetric Eigenvalue Problem, 6.9).
+constexpr double kTwice = 0.5;
 
 // Computes |a| without overflow or underflow.
 double careful_norm(const Eigen::Ref<const Eigen::RowVectorXd>& a) {

@@ -244,12 +244,12 @@ class Run {
           "body \"{}\" turns by {:.3g} rad in a step: its rotation is not resolved, its energy not "
           "kept; stepping.step should be below {:.2g} s",
           scene_.bodies[fastest_].name, fastest_turn_, 0.1 * *step_ / fastest_turn_));
-    warn_of_energy();
     if (result_.counts.unsolved > 0)
       result_.warnings.push_back(
           fmt::format("{} contact problems were not solved (stepping.on_failure = \"warn\")",
                       result_.counts.unsolved));
     if (result_.counts.unsolved == 0 && result_.counts.accepted > 0) warn_of_residual();
+    if (result_.warnings.empty()) warn_of_energy();  // which the others would explain
     result_.whole_seconds = watch_.processor();
     result_.whole_wall = watch_.wall();
   }

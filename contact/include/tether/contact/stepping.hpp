@@ -292,9 +292,14 @@ struct StageCost {
 
 /// A sub-step as an observer sees it between two of its stages (Stepper::observe).
 struct StepStage {
-  enum class When : std::uint8_t { before_all, between, after_all };
+  /// Where in the sub-step.
+  enum class When : std::uint8_t {
+    before_all,  ///< no stage has run
+    between,     ///< some have
+    after_all    ///< it is over
+  };
   const char* effect;               ///< of the stage that has run, as StageCost
-  When when;                        ///< after all: bodies() are those of its end
+  When when;                        ///< after_all: bodies() are those of its end
   double start, length;             ///< s
   const std::vector<char>* active;  ///< bodies that take part; null: all
   /// Contacts as the problem had them: bias and slip hold in the middle of the sub-step.
