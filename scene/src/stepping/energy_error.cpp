@@ -1,12 +1,7 @@
 // Tether: what steps leave of the energy. SPDX-License-Identifier: BSD-3-Clause
 #include "energy_error.hpp"
 
-#include <tether/linalg/index.hpp>
-
 namespace tether::scene::stepping {
-
-using Eigen::Vector3d;
-using linalg::at;
 
 namespace {
 
@@ -18,28 +13,28 @@ constexpr double kHolds = 0.99;
 
 }  // namespace
 
-EnergyError::EnergyError(const Vector3d& gravity, double dt, std::vector<char> joined,
-                         const contact::BodySet& bodies)
-    : gravity_(gravity),
-      dt_(dt),
-      joined_(std::move(joined)),
-      held_(joined_),
-      energy_(energy(bodies)) {}
-
 void EnergyError::begin_at(const contact::BodySet& bodies) {
   last_.clear();
-  held_ = joined_;
   energy_ = energy(bodies);
+  power_ = power(bodies);
 }
 
-// A body that is held moves by the velocity at the end of the step, which is therefore that of its
-// middle: the energy is that of the place there. Free bodies fall along their parabola.
+// Kinetic, and potential of bodies that joints hold. Their velocity at the end of a step is that of
+// its middle, and so is the place.
 double EnergyError::energy(const contact::BodySet& bodies) const {
   double sum = contact::kinetic_energy(bodies);
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    const double back = held_[i] != 0 ? 0.5 * dt_ : 0;
-    sum -= bodies.mass[i] * gravity_.dot(bodies.position[i] - back * bodies.motion[i].velocity);
-  }
+  for (std::size_t i = 0; i < joined_.size(); ++i)
+    if (joined_[i] != 0)
+      sum -=
+          bodies.mass[i] * gravity_.dot(bodies.position[i] - 0.5 * dt_ * bodies.motion[i].velocity);
+  return sum;
+}
+
+// Of the weight of all others, W.
+double EnergyError::power(const contact::BodySet& bodies) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < joined_.size(); ++i)
+    if (joined_[i] == 0) sum += bodies.mass[i] * gravity_.dot(bodies.motion[i].velocity);
   return sum;
 }
 
@@ -57,7 +52,6 @@ bool EnergyError::note(const contact::StepContacts& contacts) {
   bool steady = true;
   next_ = 0;
   now_.clear();
-  held_ = joined_;
   for (std::size_t k = 0; k < contacts.impulses.size(); ++k) {
     const contact::PointContact& c = contacts.points[k];
     const double normal = c.normal.dot(contacts.impulses[k]);
@@ -66,18 +60,20 @@ bool EnergyError::note(const contact::StepContacts& contacts) {
     steady = steady && normal <= kSteady * last && last <= kSteady * normal &&
              (friction == 0 || friction < kHolds * c.mu * normal);
     now_.emplace_back(c.id, normal);
-    for (const int body : {c.first, c.second})
-      if (body >= 0) held_[at(body)] = 1;
   }
   steady = steady && now_.size() == last_.size();
   std::swap(last_, now_);
   return steady;
 }
 
+// Contacts hold by the velocity at the end of a step, which moves a body, too: the work of its
+// weight is the mean of two steps, as it is along the parabola of a free body. Corrections of
+// positions are no motion.
 void EnergyError::add(const contact::BodySet& bodies, const contact::StepContacts& contacts) {
   const bool steady = note(contacts);
   const double last = std::exchange(energy_, energy(bodies));
-  if (steady) sum_ += energy_ - last;
+  const double pulled = std::exchange(power_, power(bodies));
+  if (steady) sum_ += energy_ - last - 0.5 * dt_ * (pulled + power_);
 }
 
 }  // namespace tether::scene::stepping

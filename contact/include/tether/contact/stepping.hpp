@@ -292,7 +292,7 @@ struct StageCost {
 
 /// A sub-step as an observer sees it between two of its stages (Stepper::observe).
 struct StepStage {
-  /// Where in the sub-step.
+  /// Its place in the sub-step.
   enum class When : std::uint8_t {
     before_all,  ///< no stage has run
     between,     ///< some have
