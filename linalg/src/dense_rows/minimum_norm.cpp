@@ -16,9 +16,10 @@ namespace {
 constexpr double kLeastShare = 1.0 / 3.0;  // of factor_kept()
 // Factors of A A^T determine the square of a larger sine to a relative error of 1e-10.
 constexpr double kLeastSine = 1e-3;
-// A unit row of which less is left is orthogonalised twice ("twice is enough": Parlett, The
-// Symmetric Eigenvalue Problem, 6.9).
-constexpr double kTwice = 0.5;
+// A unit row of which less is left, 1 / sqrt(2), is orthogonalised twice, as Daniel, Gragg, Kaufman
+// and Stewart have it (Math. Comp. 30 (1976) 772); "twice is enough": Parlett, The Symmetric
+// Eigenvalue Problem, 6.9.
+constexpr double kTwice = 0.7071067811865476;
 
 // Computes |a| without overflow or underflow.
 double careful_norm(const Eigen::Ref<const Eigen::RowVectorXd>& a) {

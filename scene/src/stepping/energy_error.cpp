@@ -30,7 +30,7 @@ double EnergyError::energy(const contact::BodySet& bodies) const {
   return sum;
 }
 
-// Of the weight of all others, W.
+// The power of the weight of all others, W.
 double EnergyError::power(const contact::BodySet& bodies) const {
   double sum = 0;
   for (std::size_t i = 0; i < joined_.size(); ++i)
