@@ -158,6 +158,20 @@ TEST_CASE("rows that write past their count end the run by name") {
     }
 }
 
+TEST_CASE("rows that write past their count later in the run end it by name, too") {
+  tp::Constraints set;
+  set.count = 1;
+  int calls = 0;
+  set.value = [&calls](double, tp::ConstVector y, tp::Vector g) {
+    const double too_many = (y.squaredNorm() - 1.0) / 2.0;
+    g.data()[0] = too_many;
+    if (++calls > 20) g.data()[1] = too_many;
+  };
+  const Ended end = run(set);
+  CHECK(end.status == tp::Status::callback_fatal);
+  CHECK(contains(end.message, "writes past its end: Constraints::count is 1"));
+}
+
 TEST_CASE("gradients that write past their count end the run by name") {
   tp::Constraints set;
   set.count = 1;

@@ -94,14 +94,14 @@ int Evaluator::write_checked(const Part& part, int n, double* g, double* C, Fill
   const std::ptrdiff_t count = part.set->count, entries = part.entries(n);
   double* const to =
       g != nullptr ? g_room_.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
-  double* const into = C != nullptr ? C_room_.begin(entries, entries + n) : nullptr;
+  const bool checks_C = C != nullptr && !part.C_checked;
+  double* const into = checks_C ? C_room_.begin(entries, entries + n) : C;
   if (g != nullptr) std::copy(g, g + count, to);
-  if (C != nullptr) std::copy(C, C + entries, into);
+  if (checks_C) std::copy(C, C + entries, into);
   const int flag = fill(to, into);
   const bool within =
-      (g == nullptr || g_room_.end(g, count)) & (C == nullptr || C_room_.end(C, entries));
-  part.g_checked |= g != nullptr;
-  part.C_checked |= C != nullptr;
+      (g == nullptr || g_room_.end(g, count)) & (!checks_C || C_room_.end(C, entries));
+  part.C_checked |= checks_C;
   return within ? flag : kOverran;
 }
 

@@ -148,7 +148,7 @@ class Evaluator {
     const SparseJacobian* sparse = std::get_if<SparseJacobian>(&set->jacobian);
     bool gives_both = (dense != nullptr && static_cast<bool>(dense->fill_with_value)) ||
                       (sparse != nullptr && static_cast<bool>(sparse->fill_with_value));
-    mutable bool g_checked = false, C_checked = false;  // the first evaluation is
+    mutable bool C_checked = false;  // the first evaluation is
     /// How many entries of C it has, on n unknowns.
     std::ptrdiff_t entries(int n) const {
       return sparse != nullptr ? static_cast<std::ptrdiff_t>(sparse->columns.size())
@@ -180,11 +180,11 @@ class Evaluator {
     return std::isfinite(sum) ? Status::success : not_finite(t, g);
   }
   Status not_finite(double t, const double* g);
-  /// A callback that writes g, C (`entries` of it) or both. The first time there is room behind
-  /// them for what it writes too much, which ends the run.
+  /// A callback that writes g, C or both. There is room behind g, the first time behind C, too, for
+  /// what it writes too much, which ends the run.
   template <class Fill>
   int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
-    const bool known = (g == nullptr || part.g_checked) && (C == nullptr || part.C_checked);
+    const bool known = g == nullptr && (C == nullptr || part.C_checked);
     return known ? fill(g, C) : write_checked(part, n, g, C, std::forward<Fill>(fill));
   }
   template <class Fill>
