@@ -70,12 +70,20 @@ inline double apart(const Quaterniond& p, const Quaterniond& q) {
 /// State of a body, world axes.
 struct State {
   Vector3d x = Vector3d::Zero(), v = Vector3d::Zero(), w = Vector3d::Zero();
+  Vector3d a = Vector3d::Zero(), alpha = Vector3d::Zero();  ///< accelerations, of an instant
   Quaterniond q = Quaterniond::Identity();
   double time = 0;  ///< s
   State() = default;
   /// Reads a line `to`.
   State(const Record& to, double at)
       : x(to.vector(1)), v(to.vector(8)), w(to.vector(11)), q(to.quaternion(4)), time(at) {}
+  /// Its state after a short time.
+  State moved(double t) const {
+    State s = *this;
+    s.x += t * (v + t / 2 * a);
+    s.q = rotation(t * (w + t / 2 * alpha)) * q;
+    return s;
+  }
   /// Velocity of its point at this place, m/s.
   Vector3d velocity(const Vector3d& p) const { return v + w.cross(p - x); }
 };
