@@ -33,14 +33,14 @@ COMMANDS = {
                       f"{BUILT}/accuracy/accuracy_cost --count 5 --repeats 2 --seconds 0.1 --no-drift --no-reach "
                       "--skip four_bar,long,chain_of_100 | sed -n '/^CPU at equal error/,$p'"),
     "dae_set": ("The DAE problems of SciMLBenchmarks",
-                "Fourteen problems, each first in the form in which IDA is given it there; IDA refuses index 3. The first table counts "
-                "the tolerances at which a run ends, and in parentheses those at which it has the digits asked less one. It compares "
-                "Tether with the variant of IDA that has more digits: digits gained, evaluations of F and time over IDA's. A cell of the "
-                "others: significant digits of the worst component, steps, evaluations of F, processor time in ms; \"limit\": beyond "
-                "12 s; more than 300000 steps fail. Digits are relative: where a problem has no units of its own, absolute tolerances "
-                "are in those of the reference's components, from 1e-4 to 1. Where digits are missing all codes lack them, RADAU5 too: "
-                "errors of single steps, which tolerances bound, add up. References: `examples/problems`. No NAND gate of theirs: it "
-                "lacks the capacities of the published one, which runs here.",
+                "Fourteen problems, each first in the form in which IDA is given it there; IDA refuses index 3. GGL: index 2, stabilised "
+                "(Gear, Gupta, Leimkuhler); w: accelerations are unknowns; suppressed: algebraic variables are out of the error test. The "
+                "first table counts the tolerances at which a run ends, and in parentheses those at which it has the digits asked less "
+                "one. It compares Tether with the variant of IDA that has more digits: digits gained, evaluations of F and processor time "
+                "over IDA's. A cell of the last tables: significant digits of the worst component, steps, evaluations of F, processor "
+                "time in ms; \"limit\": beyond 12 s; more than 300000 steps fail. Digits are relative, and absolute tolerances are in the "
+                "unit of each component of the reference, at least 1e-4 of the problem's own. References: `examples/problems`. No NAND "
+                "gate of theirs: it lacks the capacities of the published one, which runs here.",
                 f"{BUILT}/accuracy/dae_set --repeats 1 --seconds 12 --svg benchmarks/results/dae_set"),
     "crossover": ("Where RADAU5's advantage on small smooth problems ends",
                   "Time and evaluations of F of Tether over those of RADAU5: below 1 Tether needs less.",
@@ -153,12 +153,12 @@ def write(name):
 def index():
     """results/index.md: every kept result with its command, and their pictures."""
     lines = ["# Results", "", "Written by `python3 benchmarks/results.py --index`. [How to read them](../README.md).", "",
-             "| result | command |", "|---|---|"]
+             "| result | command | commit | date |", "|---|---|---|---|"]
     for file in sorted(RESULTS.glob("*.md")):
         if file.name != "index.md":
-            title = file.read_text().split("\n", 1)[0].lstrip("# ")
-            command = f"`python3 benchmarks/results.py {file.stem}`" if file.stem in COMMANDS else "see the page"
-            lines.append(f"| [{title}]({file.name}) | {command} |")
+            text = file.read_text()
+            title, (revision, day) = text.split("\n", 1)[0].lstrip("# "), re.findall(r"^- (?:Commit|Date): (.*)", text, re.M)
+            lines.append(f"| [{title}]({file.name}) | `python3 benchmarks/results.py {file.stem}` | {revision} | {day} |")
     for file in sorted(RESULTS.glob("*/*.svg")):
         place = file.relative_to(RESULTS)
         lines += ["", f"![{file.stem.replace('_', ' ')}: error against time]({place})"]

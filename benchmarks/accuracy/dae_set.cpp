@@ -26,6 +26,8 @@ struct Cell {
   Run run;
   double digits = std::nan("");
   bool good() const { return ran && !run.failed && std::isfinite(digits); }
+  /// It has the digits that the tolerance asks for, less one.
+  bool exact(double tolerance) const { return good() && digits >= -std::log10(tolerance) - 1.0; }
 };
 
 // By code, then by tolerance.
@@ -37,6 +39,18 @@ std::string text(const Cell& cell) {
   if (!cell.good()) return "fails";
   return fmt::format("{:.1f}, {}, {}, {:.3g}", cell.digits, cell.run.steps, cell.run.residuals,
                      cell.run.cpu_ms);
+}
+
+std::string line(const std::vector<std::string>& cells) {
+  std::string out = "|";
+  for (const std::string& cell : cells) out += " " + cell + " |";
+  return out + "\n";
+}
+
+std::string head(const std::vector<std::string>& cells) {
+  std::string out = line(cells) + "|";
+  for (std::size_t k = 0; k < cells.size(); ++k) out += "---|";
+  return out + "\n";
 }
 
 // A code that took too long is not tried at tighter tolerances.
@@ -74,20 +88,19 @@ std::string solved(const std::vector<Cell>& cells, const std::vector<double>& to
   int ends = 0, exact = 0;
   for (std::size_t k = 0; k < cells.size(); ++k) {
     ends += cells[k].good();
-    exact += cells[k].good() && cells[k].digits >= -std::log10(tolerances[k]) - 1.0;
+    exact += cells[k].exact(tolerances[k]);
   }
   return fmt::format("{} ({})", ends, exact);
 }
 
-// Digits are relative: absolute tolerances are in the unit of each component, unless the problem
-// has units of its own. Those far below the others are noise.
+// Digits are relative: an absolute tolerance is in the unit of its component of the reference, at
+// most in that of the problem and at least in a ten-thousandth of it.
 void set_units(tether::problems::Problem& problem) {
   const double smallest = 1e-4;
-  if (!problem.atol_scale.empty()) return;
-  problem.atol_scale.assign(static_cast<std::size_t>(problem.size), 1.0);
+  problem.atol_scale.resize(static_cast<std::size_t>(problem.size), 1.0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(problem.error_components); ++k)
-    if (std::isfinite(problem.reference[k]))
-      problem.atol_scale[k] = std::clamp(std::abs(problem.reference[k]), smallest, 1.0);
+    if (double& unit = problem.atol_scale[k]; std::abs(problem.reference[k]) > 0)
+      unit *= std::clamp(std::abs(problem.reference[k]) / unit, smallest, 1.0);
 }
 
 // Digits, F and time of ours beside the variant of IDA with more digits, where both run.
@@ -132,6 +145,81 @@ std::vector<std::string> summary(const Runs& runs, const std::vector<double>& to
           verdict};
 }
 
+// Which runs have the digits asked less one. Of a problem and tolerance a code's best form counts.
+class Misses {
+ public:
+  void add(const std::string& problem, const std::map<std::string, Runs>& forms,
+           const std::vector<double>& tolerances) {
+    for (std::size_t k = 0; k < tolerances.size(); ++k) {
+      std::string reached;
+      std::vector<std::string> best;
+      for (Count& each : counts_) {
+        const Cell cell = best_of(forms, each.variants, k);
+        const bool exact = cell.exact(tolerances[k]);
+        best.push_back(shown(cell));
+        each.runs += cell.ran, each.misses += cell.ran && !exact;
+        if (exact && each.code != "Tether") reached += (reached.empty() ? "" : ", ") + each.code;
+      }
+      if (reached.empty()) reached = "none";
+      for (const auto& [form, runs] : forms) {
+        const Cell& ours = runs.at("Tether")[k];
+        if (!ours.ran || ours.exact(tolerances[k])) continue;
+        ++misses_, alone_ += reached != "none";
+        std::vector<std::string> cells = {problem, form, fmt::format("{:.0e}", tolerances[k]),
+                                          shown(ours)};
+        cells.insert(cells.end(), best.begin(), best.end());
+        cells.push_back(reached);
+        rows_ += line(cells);
+      }
+    }
+  }
+
+  std::string markdown() const {
+    std::string out =
+        "\n## Digits asked less one\n\nProblems and tolerances at which they are missed";
+    std::vector<std::string> columns = {"problem", "form", "tolerance", "Tether in it"};
+    for (const Count& each : counts_) {
+      out += fmt::format(", {} {} of {}", each.code, each.misses, each.runs);
+      columns.push_back(each.code);
+    }
+    columns.emplace_back("others who have them");
+    out += fmt::format(
+        ", each code in its best form. All runs of Tether that miss them, in any form, follow; at "
+        "{} "
+        "of these {} another code has them, at the others none: they belong to the problem at that "
+        "tolerance.\n\n",
+        alone_, misses_);
+    return out + head(columns) + rows_;
+  }
+
+ private:
+  struct Count {
+    std::string code;
+    std::vector<std::string> variants;
+    int runs = 0, misses = 0;
+  };
+  static Cell best_of(const std::map<std::string, Runs>& forms,
+                      const std::vector<std::string>& variants, std::size_t k) {
+    Cell best;
+    for (const auto& [form, runs] : forms)
+      for (const std::string& name : variants) {
+        const Cell& cell = runs.at(name)[k];
+        if (!best.good() ? cell.ran : cell.good() && cell.digits > best.digits) best = cell;
+      }
+    return best;
+  }
+  static std::string shown(const Cell& cell) {
+    return cell.good() ? fmt::format("{:.1f}", cell.digits) : text(cell);
+  }
+
+  std::vector<Count> counts_ = {{"Tether", {"Tether"}},
+                                {"IDA", {"IDA", "IDA suppressed"}},
+                                {"RADAU5", {"RADAU5"}},
+                                {"DASPK", {"DASPK", "DASPK suppressed"}}};
+  int misses_ = 0, alone_ = 0;
+  std::string rows_;
+};
+
 void add_points(const std::string& form, const std::vector<double>& tolerances, const Runs& runs,
                 std::vector<Point>& points) {
   for (const auto& [code, cells] : runs) {
@@ -142,21 +230,10 @@ void add_points(const std::string& form, const std::vector<double>& tolerances, 
       point.code = code;
       point.tolerance = tolerances[k];
       point.run = cells[k].run;
+      point.run.error = std::pow(10.0, -cells[k].digits);
       points.push_back(std::move(point));
     }
   }
-}
-
-std::string line(const std::vector<std::string>& cells) {
-  std::string out = "|";
-  for (const std::string& cell : cells) out += " " + cell + " |";
-  return out + "\n";
-}
-
-std::string head(const std::vector<std::string>& cells) {
-  std::string out = line(cells) + "|";
-  for (std::size_t k = 0; k < cells.size(); ++k) out += "---|";
-  return out + "\n";
 }
 
 Codes wanted_codes() {
@@ -176,6 +253,7 @@ int run(const std::vector<Case>& cases, const std::vector<double>& tolerances, d
   std::string table = head({"problem", "form", "IDA", "IDA suppressed", "Tether", "RADAU5",
                             "digits", "F", "time", "Tether beside IDA"});
   std::string details;
+  Misses misses;
   for (const Case& which : cases) {
     fmt::print(stderr, "{}\n", which.name);
     details += fmt::format("\n## {}: {}\n\n", which.name, which.text);
@@ -183,6 +261,7 @@ int run(const std::vector<Case>& cases, const std::vector<double>& tolerances, d
     columns.insert(columns.end(), kColumns.begin(), kColumns.end());
     std::string rows;
     std::vector<Point> points;
+    std::map<std::string, Runs> forms;
     for (tether::problems::Problem problem : which.forms) {
       set_units(problem);
       Runs runs = run_all(problem, codes, tolerances, limits, repeats);
@@ -196,17 +275,20 @@ int run(const std::vector<Case>& cases, const std::vector<double>& tolerances, d
         rows += line(cells);
       }
       add_points(problem.form, tolerances, runs, points);
+      forms[problem.form] = std::move(runs);
     }
+    misses.add(which.name, forms, tolerances);
     if (!pictures.empty()) {
       std::string file = which.name + ".svg";
       std::replace(file.begin(), file.end(), ' ', '_');
-      write_file(pictures + "/" + file, picture(which, points));
+      write_file(pictures + "/" + file,
+                 picture(which, points, "relative error of the worst component"));
       details += fmt::format("![error against time]({}/{})\n\n",
                              pictures.substr(pictures.rfind('/') + 1), file);
     }
     details += head(columns) + rows;
   }
-  fmt::print("{}{}", table, details);
+  fmt::print("{}{}{}", table, misses.markdown(), details);
   return 0;
 }
 

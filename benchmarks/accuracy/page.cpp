@@ -18,8 +18,26 @@ constexpr std::array<const char*, 12> kColours = {"#000000", "#7f7f7f", "#d55e00
                                                   "#0072b2", "#009e73", "#cc79a7", "#56b4e9",
                                                   "#f0e442", "#8c564b", "#4b0082", "#7a9a01"};
 
-constexpr double kWidth = 640, kHeight = 400, kLeft = 64, kRight = 150, kTop = 30, kBottom = 46;
+constexpr std::array<const char*, 4> kDashes = {"", "7 3", "2 3", "7 3 2 3"};
 
+// Position of a text in a list, at whose end it is put if it is new.
+std::size_t place_of(std::vector<std::string>& list, const std::string& text) {
+  const auto found = std::find(list.begin(), list.end(), text);
+  if (found != list.end()) return static_cast<std::size_t>(found - list.begin());
+  list.push_back(text);
+  return list.size() - 1;
+}
+
+std::string stroke(const std::string& path, const char* colour, const char* dashes, double width) {
+  return fmt::format(
+      "<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-dasharray=\"{}\"/>",
+      path, colour, width, dashes);
+}
+
+constexpr double kWidth = 640, kHeight = 400, kLeft = 64, kRight = 150, kTop = 30, kBottom = 46;
+constexpr double kInner = kWidth - kLeft - kRight, kTall = kHeight - kTop - kBottom;
+
+// A logarithmic axis; its ends are powers of ten.
 struct Axis {
   double low = 1e300, high = -1e300;
   void add(double value) {
@@ -35,54 +53,37 @@ struct Axis {
   double share(double value) const { return (std::log10(value) - low) / (high - low); }
 };
 
-}  // namespace
-
-std::string svg(const std::string& title, const std::string& x_label, const std::string& y_label,
-                const std::vector<Line>& lines) {
-  Axis ax, ay;
-  for (const Line& line : lines) {
-    for (const double x : line.x) ax.add(x);
-    for (const double y : line.y) ay.add(y);
+class Picture {
+ public:
+  explicit Picture(const std::vector<Line>& lines) {
+    for (const Line& line : lines) {
+      for (const double x : line.x) x_.add(x);
+      for (const double y : line.y) y_.add(y);
+    }
+    x_.round();
+    y_.round();
   }
-  ax.round();
-  ay.round();
-  const double w = kWidth - kLeft - kRight, h = kHeight - kTop - kBottom;
-  const auto px = [&](double x) { return kLeft + w * ax.share(x); };
-  const auto py = [&](double y) { return kTop + h * (1.0 - ay.share(y)); };
 
-  std::string out = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" width=\"{}\" "
-      "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" "
-      "fill=\"white\"/>\n<text x=\"{}\" y=\"18\" font-size=\"14\">{}</text>\n",
-      kWidth, kHeight, kWidth, kLeft, html_escape(title));
-  const auto grid = [&](const Axis& axis, bool vertical) {
+  std::string grid(bool vertical) const {
+    std::string out;
+    const Axis& axis = vertical ? x_ : y_;
     const int stride = axis.high - axis.low > 9.0 ? 2 : 1;
     for (int k = static_cast<int>(axis.low); k <= static_cast<int>(axis.high); k += stride) {
       const double value = std::pow(10.0, k);
-      const double x1 = vertical ? px(value) : kLeft, x2 = vertical ? x1 : kLeft + w;
-      const double y1 = vertical ? kTop : py(value), y2 = vertical ? kTop + h : y1;
+      const double x1 = vertical ? px(value) : kLeft, x2 = vertical ? x1 : kLeft + kInner;
+      const double y1 = vertical ? kTop : py(value), y2 = vertical ? kTop + kTall : y1;
       out += fmt::format(
           "<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\" stroke=\"#ddd\"/><text x=\"{:.1f}\" "
           "y=\"{:.1f}\" text-anchor=\"{}\">1e{}</text>\n",
-          x1, y1, x2, y2, vertical ? x1 : kLeft - 6, vertical ? kTop + h + 16 : y1 + 4,
+          x1, y1, x2, y2, vertical ? x1 : kLeft - 6, vertical ? kTop + kTall + 16 : y1 + 4,
           vertical ? "middle" : "end", k);
     }
-  };
-  grid(ax, true);
-  grid(ay, false);
-  out += fmt::format(
-      "<text x=\"{:.0f}\" y=\"{:.0f}\" text-anchor=\"middle\">{}</text><text "
-      "text-anchor=\"middle\" "
-      "transform=\"translate(16 {:.0f}) rotate(-90)\">{}</text>\n",
-      kLeft + w / 2, kHeight - 8, html_escape(x_label), kTop + h / 2, html_escape(y_label));
+    return out;
+  }
 
-  std::vector<std::string> names;
-  for (const Line& line : lines) {
-    auto found = std::find(names.begin(), names.end(), line.name);
-    if (found == names.end()) found = names.insert(names.end(), line.name);
-    const char* colour =
-        kColours[static_cast<std::size_t>(found - names.begin()) % kColours.size()];
-    out += fmt::format("<g fill=\"{}\"><title>{}</title>", colour, html_escape(line.hint));
+  std::string curve(const Line& line, const char* colour, const char* dashes) const {
+    std::string out = fmt::format("<g fill=\"{}\"><title>{}, {}</title>", colour,
+                                  html_escape(line.name), html_escape(line.form));
     std::string path;
     for (std::size_t i = 0; i < line.x.size(); ++i) {
       if (!(line.x[i] > 0.0) || !(line.y[i] > 0.0)) continue;
@@ -91,17 +92,51 @@ std::string svg(const std::string& title, const std::string& x_label, const std:
       out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>", x, y,
                          line.points_only ? 1.6 : 2.6);
     }
-    if (!line.points_only)
-      out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"/>", path,
-                         colour);
-    out += "</g>\n";
+    if (!line.points_only) out += stroke(path, colour, dashes, 1.2);
+    return out + "</g>\n";
   }
+
+ private:
+  double px(double x) const { return kLeft + kInner * x_.share(x); }
+  double py(double y) const { return kTop + kTall * (1.0 - y_.share(y)); }
+  Axis x_, y_;
+};
+
+}  // namespace
+
+std::string svg(const std::string& title, const std::string& x_label, const std::string& y_label,
+                const std::vector<Line>& lines, const std::vector<std::string>& order) {
+  const Picture picture(lines);
+  std::string out = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
+      "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" "
+      "fill=\"white\"/>\n<text x=\"{2}\" y=\"18\" font-size=\"14\">{3}</text>\n",
+      kWidth, kHeight, kLeft, html_escape(title));
+  out += picture.grid(true) + picture.grid(false);
+  out += fmt::format(
+      "<text x=\"{:.0f}\" y=\"{:.0f}\" text-anchor=\"middle\">{}</text><text "
+      "text-anchor=\"middle\" transform=\"translate(16 {:.0f}) rotate(-90)\">{}</text>\n",
+      kLeft + kInner / 2, kHeight - 8, html_escape(x_label), kTop + kTall / 2,
+      html_escape(y_label));
+
+  std::vector<std::string> names = order, forms;
+  for (const Line& line : lines)
+    out += picture.curve(line, kColours[place_of(names, line.name) % kColours.size()],
+                         kDashes[place_of(forms, line.form) % kDashes.size()]);
+  double row = kTop + 12;
+  const auto legend = [&](const std::string& name, const char* colour, const char* dashes,
+                          double width) {
+    out +=
+        stroke(fmt::format("M{:.0f} {:.0f}h18", kLeft + kInner + 8, row), colour, dashes, width) +
+        fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\">{}</text>\n", kLeft + kInner + 32, row + 4,
+                    html_escape(name));
+    row += 18;
+  };
   for (std::size_t k = 0; k < names.size(); ++k)
-    out += fmt::format(
-        "<circle cx=\"{0:.0f}\" cy=\"{1:.0f}\" r=\"4\" fill=\"{2}\"/><text x=\"{3:.0f}\" "
-        "y=\"{4:.0f}\">{5}</text>\n",
-        kLeft + w + 14, kTop + 12 + 18.0 * static_cast<double>(k), kColours[k % kColours.size()],
-        kLeft + w + 24, kTop + 16 + 18.0 * static_cast<double>(k), html_escape(names[k]));
+    if (std::any_of(lines.begin(), lines.end(), [&](const Line& l) { return l.name == names[k]; }))
+      legend(names[k], kColours[k % kColours.size()], "", 4);
+  for (std::size_t k = 0; forms.size() > 1 && k < forms.size(); ++k)
+    legend(forms[k], kColours[0], kDashes[k % kDashes.size()], 1.2);
   return out + "</svg>\n";
 }
 

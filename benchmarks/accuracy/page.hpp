@@ -11,15 +11,15 @@ using Json = nlohmann::ordered_json;
 
 /// A line of a picture; both axes are logarithmic.
 struct Line {
-  std::string name;  ///< the legend shows each name once, in the order of first use
-  std::string hint;  ///< shown when the mouse rests on a point
+  std::string name;  ///< by colour
+  std::string form;  ///< by dashes, where there are several
   std::vector<double> x, y;
   bool points_only = false;
 };
 
-/// An SVG picture that needs nothing from outside.
+/// An SVG picture that needs nothing from outside. Names in `order` have the same colour in all.
 std::string svg(const std::string& title, const std::string& x_label, const std::string& y_label,
-                const std::vector<Line>& lines);
+                const std::vector<Line>& lines, const std::vector<std::string>& order = {});
 
 /// A table; printed aligned, as HTML, and kept as strings so that all outputs agree.
 struct Table {

@@ -181,19 +181,21 @@ Table work_at(const std::vector<Point>& points, double tolerance) {
   return table;
 }
 
-std::string picture(const Case& which, const std::vector<Point>& points) {
+std::string picture(const Case& which, const std::vector<Point>& points, const std::string& error) {
+  static const std::vector<std::string> codes = {
+      "IDA suppressed", "DASPK suppressed", "IDA",        "DASPK",
+      "Tether",         "RADAU5",           "CVODE+proj", "CPodes"};
   std::vector<Line> lines;
   for (const Point& point : points) {
-    const std::string hint = point.code + ", " + point.form;
-    auto line =
-        std::find_if(lines.begin(), lines.end(), [&](const Line& l) { return l.hint == hint; });
-    if (line == lines.end())
-      line = lines.insert(lines.end(), Line{point.code, hint, {}, {}, false});
     if (!point.usable() || point.run.error > 1.0) continue;
+    auto line = std::find_if(lines.begin(), lines.end(), [&](const Line& l) {
+      return l.name == point.code && l.form == point.form;
+    });
+    if (line == lines.end()) line = lines.insert(lines.end(), Line{point.code, point.form, {}, {}});
     line->x.push_back(std::max(point.run.error, 1e-16));
     line->y.push_back(point.run.cpu_ms);
   }
-  return svg(which.name + ": " + which.text, "end error (mixed)", "CPU ms", lines);
+  return svg(which.name + ": " + which.text, error, "processor time, ms", lines, codes);
 }
 
 std::string csv_head() {

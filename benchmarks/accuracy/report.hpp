@@ -55,7 +55,9 @@ Table unmet(const std::vector<Point>& points, const std::string& only = "");
 /// Every code and form at the tolerance nearest to this one.
 Table work_at(const std::vector<Point>& points, double tolerance);
 
-std::string picture(const Case& which, const std::vector<Point>& points);
+std::string picture(
+    const Case& which, const std::vector<Point>& points,
+    const std::string& error = "error at the end, |y - reference| / (1 + |reference|)");
 std::string csv_head();
 std::string csv_line(const Point& point);
 Json json_point(const Point& point);

@@ -169,7 +169,8 @@ int main(int argc, char** argv) {
                          {"steps_scatter", steps.scatter},
                          {"cpu", s.cpu.value()},
                          {"failures", s.failures}});
-        points.push_back({s.code, s.code, powers(s.log_tolerance), powers(s.log_error), true});
+        points.push_back(
+            {s.code, problem.form, powers(s.log_tolerance), powers(s.log_error), true});
       }
       pictures += svg(which.name + ", " + problem.form, "tolerance", "end error (mixed)", points);
     }

@@ -149,8 +149,7 @@ std::string picture(const std::vector<Run>& runs, const std::string& problem, La
     const bool one_of_siconos = r.solver.rfind("Siconos ", 0) == 0;
     if (r.problem != problem || r.law != law || one_of_siconos || !r.solved) continue;
     title = fmt::format("{}, {} contacts, {}", problem, r.contacts, name(law));
-    if (lines.empty() || lines.back().name != r.solver)
-      lines.push_back({r.solver, r.solver, {}, {}, false});
+    if (lines.empty() || lines.back().name != r.solver) lines.push_back({r.solver, "", {}, {}});
     lines.back().x.push_back(r.ms);
     // Exact to the last bit has no logarithm.
     lines.back().y.push_back(std::max(r.error, 1e-17));

@@ -61,7 +61,7 @@ void add(Report& report, const std::string& name, const scene::CostTable& table,
   const double slope = order(table);
   Table out;
   out.head = {name, "error", "ms", "steps", "us per step", "depth / m"};
-  Line line{"time step", table.reference, {}, {}, false};
+  Line line{"time step", "", {}, {}};
   for (const scene::CostRow& row : table.rows) {
     const bool failed = !row.failure.empty();
     out.rows.push_back(

@@ -112,10 +112,10 @@ def cell(runs, level):
 
 
 def table(scene, folder, arguments):
-    """Prints the tables of a scene; gives engine -> level -> least time."""
+    """The tables of a scene, and engine -> level -> least time."""
     title = re.search(r'^name = "(.*)"', text(scene), re.M).group(1)
-    print(f'\n## {title[0].upper() + title[1:]}\n\n| engine | setting | least error | its time, ms |'
-          + ''.join(f' {level:.0e} |' for level in LEVELS) + '\n|---|---|---|---|' + '---|' * len(LEVELS))
+    out = [f'\n## {title[0].upper() + title[1:]}\n', '| engine | setting | least error, m | its time, ms |'
+           + ''.join(f' {level:.0e} m |' for level in LEVELS), '|---|---|---|---|' + '---|' * len(LEVELS)]
     best, lines, reasons = {}, [], []
     for engine, (name, _, settings) in ENGINES.items():
         if not (folder / name).exists():
@@ -124,29 +124,27 @@ def table(scene, folder, arguments):
             if setting in (WITHOUT_CONTACT if '[[pair]]' in text(scene) else OF_CONTACT):
                 continue
             runs, reason = ladder(folder / name, scene, setting, values, arguments)
-            if not runs:
-                reasons.append(f'No run of {engine}, {setting}: {reason}')
-                continue
             if reason:
-                reasons.append(f'Not all runs of {engine}, {setting}: {reason}')
+                reasons.append(f"\n{'Not all runs' if runs else 'No run'} of {engine}, {setting}: {reason}")
+            if not runs:
+                continue
             value, time, error = min(runs, key=lambda run: run[2])
-            print(f'| {engine} | {setting} | {error:.1e} | {1e3 * time:.3g} | '
-                  + ' | '.join(cell(runs, level) for level in LEVELS) + ' |', flush=True)
+            out.append(f'| {engine} | {setting} | {error:.1e} | {1e3 * time:.3g} | '
+                       + ' | '.join(cell(runs, level) for level in LEVELS) + ' |')
             lines += [f'| {engine} | {setting} | {v:.3g} | {e:.2e} | {1e3 * t:.3g} |' for v, t, e in runs]
             for level in LEVELS:
                 times = [t for _, t, e in runs if e <= level]
                 best.setdefault(engine, {})[level] = min(times + [best.get(engine, {}).get(level, math.inf)])
-    for reason in reasons:
-        print(f'\n{reason}')
+    out += reasons
     if arguments.runs:
-        print('\n| engine | setting | steps a sample, or tolerance | error | ms |\n|---|---|---|---|---|\n' + '\n'.join(lines))
-    return best
+        out += ['\n| engine | setting | steps a sample, or tolerance | error, m | ms |\n|---|---|---|---|---|', *lines]
+    return '\n'.join(out), best
 
 
 def summary(bests):
-    """Who reaches each level, and how soon; bold: the soonest."""
-    print('\n## All scenes\n\nLeast time of each engine over all its settings, ms; bold: the least of all.\n\n| scene | error |'
-          + ''.join(f' {engine} |' for engine in ENGINES) + '\n|---|---|' + '---|' * len(ENGINES))
+    """Who reaches each error, and how soon; bold: the soonest."""
+    print('\n## All scenes\n\nLeast time of each engine over all its settings, ms; bold: the least of all; -: not within the limit.\n\n'
+          '| scene | error, m |' + ''.join(f' {engine} |' for engine in ENGINES) + '\n|---|---|' + '---|' * len(ENGINES))
     sooner = []
     for scene, best in bests.items():
         for level in LEVELS:
@@ -177,12 +175,14 @@ def main():
         elif shutil.which('dpkg-query') and package.startswith('lib'):
             found = subprocess.run(['dpkg-query', '-W', package], capture_output=True, text=True).stdout
             print(f'- {engine}: Debian package', ' '.join(found.split()))
-    print('\n| engine | setting | meaning |\n|---|---|---|')
+    tables = {scene: table(scene, arguments.folder, arguments) for scene in arguments.scene.split(',')}
+    summary({scene: best for scene, (_, best) in tables.items()})
+    print('\n## Settings\n\n| engine | setting | meaning |\n|---|---|---|')
     for engine, (_, _, settings) in ENGINES.items():
         for setting, (_, meaning) in settings.items():
             print(f'| {engine} | {setting} | {meaning} |')
-    bests = {scene: table(scene, arguments.folder, arguments) for scene in arguments.scene.split(',')}
-    summary(bests)
+    for shown, _ in tables.values():
+        print(shown)
     return os.EX_OK
 
 

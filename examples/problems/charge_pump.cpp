@@ -9,6 +9,7 @@ namespace tether::problems {
 namespace {
 
 constexpr double kThreshold = 0.2, kBody = 0.035, kPhi = 1.01, kOxide = 4e-12;
+const double kFlat = kThreshold - kBody * std::sqrt(kPhi) - kPhi;  // flat-band voltage
 constexpr double kSourceCapacity = 1.6e-12, kDrainCapacity = 0.4e-12;
 constexpr double kHigh = 20.0, kPeriod = 120e-9, kUp = 50e-9, kTop = 60e-9, kDown = 110e-9;
 
@@ -30,13 +31,12 @@ template <class S>
 Charges<S> transistor(S bulk, S source, S drain) {
   using std::sqrt;
   if (source <= drain) std::swap(source, drain);
-  const double flat = kThreshold - kBody * std::sqrt(kPhi) - kPhi;
-  if (bulk <= flat) return {kOxide * (bulk - flat), 0.0};
+  if (bulk <= kFlat) return {kOxide * (bulk - kFlat), 0.0};
   const S depth = kPhi - (source - bulk);
   const S root = sqrt(depth > S(0.0) ? depth : S(0.0));
   const S threshold = kThreshold + kBody * (root - std::sqrt(kPhi));
   if (source <= threshold)
-    return {kOxide * kBody * (sqrt(kBody * kBody / 4.0 + bulk - flat) - kBody / 2.0), 0.0};
+    return {kOxide * kBody * (sqrt(kBody * kBody / 4.0 + bulk - kFlat) - kBody / 2.0), 0.0};
   const S over = source - threshold;
   const S beyond = drain > threshold ? drain - threshold : S(0.0);
   const S third = (beyond + over - beyond * over / (beyond + over)) / 3.0;
@@ -81,10 +81,12 @@ Problem charge_pump() {
                                     g[1] = y[3] + y[4];
                                   }));
   p.recommended = {"charges", "source", "kept"};
-  // GAMD in quadruple precision: the transistor is as at the start, and the current that of the
-  // falling voltage.
-  p.reference = {0.126280042987675933170893e-12, 0, 0, 0, 0, 0, 0, 0,
-                 0.152255686815577679043511e-3};
+  // Exact: the transistor is as at the start, and the current is that of the falling voltage. The
+  // current published with the problem differs by 6e-6 of it.
+  const double root = std::sqrt(kBody * kBody / 4.0 - kFlat);
+  p.reference.assign(9, 0.0);
+  p.reference[0] = kOxide * kBody * (root - kBody / 2.0);
+  p.reference[8] = kOxide * kBody / (2.0 * root) * kHigh / (kPeriod - kDown);
   return p;
 }
 

@@ -1,5 +1,7 @@
 // Tether: NAND gate of the test set for IVP solvers. SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 #include <problems/circuit.hpp>
 #include <problems/dual.hpp>
 #include <problems/nand_gate.hpp>
@@ -104,8 +106,6 @@ Problem nand_gate(const std::string& form) {
   Problem p = start_problem("nand gate", form, index1 ? 1 : 0, 80.0, v0, yp0, id);
   p.error_components = kNodes;
   if (index1) {
-    p.atol_scale.assign(2 * kNodes, 1.0);
-    std::fill(p.atol_scale.begin() + kNodes, p.atol_scale.end(), c.gate_capacity);
     p.residual = [c](double t, const double* y, const double* yp, double* r) {
       const List f = currents(c, t, y);
       charges(c, y, r + kNodes);
@@ -133,6 +133,11 @@ Problem nand_gate(const std::string& form) {
                  4.970593243278363,   -2.500077409198803,     -2.499998781491227,
                  -0.2090289583878100, -0.2399999999966269e-3, -0.2091214032073855,
                  -2.499999999999991,  -2.500077409198803};
+  // One node is below a millivolt; a charge is as small as its voltage, times a capacity.
+  for (const double volts : p.reference)
+    p.atol_scale.push_back(std::clamp(std::abs(volts), 1e-4, 1.0));
+  for (int i = 0; index1 && i < kNodes; ++i)
+    p.atol_scale.push_back(c.gate_capacity * p.atol_scale[static_cast<std::size_t>(i)]);
   p.reference.resize(static_cast<std::size_t>(p.size), std::nan(""));
   return p;
 }
