@@ -39,12 +39,13 @@ class Bullet {
     world_.setGravity(bt(scene.gravity));
     btContactSolverInfo& info = world_.getSolverInfo();
     info.m_restitutionVelocityThreshold = 0;
-    if (setting == "1000 iterations") {
+    if (setting.find("1000 iterations") == 0) {
       info.m_numIterations = 1000;
       info.m_leastSquaresResidualThreshold = 1e-28;  // ends earlier where it has converged
     }
-    gContactBreakingThreshold =
-        setting == "Dantzig, no contact ahead" ? 1e-9 : 0.02;  // gaps that count as contacts, m
+    gContactBreakingThreshold = setting.find("no contact ahead") != std::string::npos
+                                    ? 1e-9
+                                    : 0.02;  // gaps that count as contacts, m
     if (setting != "defaults")
       info.m_splitImpulsePenetrationThreshold = 0;  // corrections never become velocities
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) add(scene.bodies[i], static_cast<int>(i));

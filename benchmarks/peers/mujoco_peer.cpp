@@ -33,14 +33,15 @@ class MuJoCo {
     xml << std::setprecision(17)
         << "<mujoco><compiler angle=\"radian\" boundmass=\"0\" balanceinertia=\"false\"/>"
         << "<option timestep=\"" << h << "\" gravity=" << quoted(scene.gravity);
+    const std::size_t comma = setting.find(',');
     if (setting != "defaults")
-      xml << " integrator=\"RK4\" cone=\"elliptic\" impratio=\"100\" tolerance=\"0\" "
-             "iterations=\"100\"";
+      xml << " integrator=\"" << setting.substr(0, comma)
+          << "\" cone=\"elliptic\" impratio=\"100\" tolerance=\"0\" iterations=\"100\"";
     xml << "/><worldbody>";
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       if (parent(i) < 0) write(xml, i);
     xml << "</worldbody>";
-    laws(xml, setting == "defaults" ? 0 : std::atoi(setting.c_str() + 5) * h);
+    laws(xml, setting == "defaults" ? 0 : std::atoi(setting.c_str() + comma + 1) * h);
     xml << "</mujoco>";
     load(xml.str());
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) start(i);

@@ -50,7 +50,6 @@ class Ode {
       dBodySetPosition(id, b.x.x(), b.x.y(), b.x.z()), dBodySetQuaternion(id, q);
       dBodySetLinearVel(id, b.v.x(), b.v.y(), b.v.z()),
           dBodySetAngularVel(id, b.w.x(), b.w.y(), b.w.z());
-      dBodySetFiniteRotationMode(id, 1);  // "more accurate for high speed rotations"
     }
     bodies_.push_back(id);
     for (const peers::Shape& s : b.shapes) {

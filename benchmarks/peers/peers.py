@@ -27,7 +27,7 @@ TOLERANCES = [10.0 ** -k for k in range(2, 13)]
 ACCURACIES = [10.0 ** -k for k in range(1, 9)]
 # Settings for scenes without contacts, and those that differ from others with contacts only.
 WITHOUT_CONTACT = {'smooth', 'smooth, energy kept', 'RungeKuttaMerson', 'CPodes'}
-OF_CONTACT = {'Dantzig, no contact ahead', 'RK4, 4 h', 'RK4, 16 h', 'SemiExplicitEuler, PGS'}
+OF_CONTACT = {'1000 iterations, no contact ahead', 'RK4, 2 h', 'RK4, 4 h', 'Euler, 1 h', 'SemiExplicitEuler, PGS', 'SemiExplicitEuler, no projection'}
 # Engine: (program, package, setting -> (its ladder, what it is)).
 ENGINES = {
     'Tether': ('tether_peer', 'this project', {
@@ -39,24 +39,26 @@ ENGINES = {
     'Bullet': ('bullet_peer', 'libbullet-dev', {
         'defaults': (STEPS, 'sequential impulses, 10 iterations; as in all settings, no threshold of restitution'),
         '1000 iterations': (STEPS, 'or fewer, to round-off; split impulse at every depth'),
-        'Dantzig': (STEPS, '`btMLCPSolver` with the direct solver; split impulse at every depth'),
-        'Dantzig, no contact ahead': (STEPS, 'gaps are no contacts, by `gContactBreakingThreshold`; else a bounce loses '
-                                      'the speed that closes the gap')}),
+        '1000 iterations, no contact ahead': (STEPS, 'gaps are no contacts, by `gContactBreakingThreshold`; else a bounce loses the speed '
+                                              'that closes the gap'),
+        'Dantzig': (STEPS, '`btMLCPSolver` with the direct solver; split impulse at every depth')}),
     'ODE': ('ode_peer', 'libode-dev', {
-        'world step': (STEPS, 'direct solver, ERP 0.2; as in all settings, finite rotations, friction along the slip, '
-                       '`dContactApprox1`'),
+        'world step': (STEPS, 'direct solver, ERP 0.2; as in all settings, friction along the slip, `dContactApprox1`'),
         'world step, ERP 0.8': (STEPS, 'corrects positions sooner'),
         'quick step': (STEPS, '200 iterations')}),
     'MuJoCo': ('mujoco_peer', 'libmujoco-dev', {
         'defaults': (STEPS, 'semi-implicit Euler, pyramids, soft contacts of 0.02 s'),
         'RK4, 1 h': (STEPS, 'Newton to round-off, elliptic cones, `impratio` 100; contacts and loops are springs of the time 1 step, '
                      'with the damping that gives the restitution'),
-        'RK4, 4 h': (STEPS, 'of 4 steps'), 'RK4, 16 h': (STEPS, 'of 16 steps')}),
+        'RK4, 2 h': (STEPS, 'of 2 steps'), 'RK4, 4 h': (STEPS, 'of 4 steps'),
+        'Euler, 1 h': (STEPS, 'semi-implicit Euler, else as RK4'), 'Euler, 4 h': (STEPS, 'of 4 steps'),
+        'implicit, 4 h': (STEPS, 'Euler, implicit in the velocity')}),
     'Simbody': ('simbody_peer', 'libsimbody-dev', {
         'RungeKuttaMerson': (TOLERANCES, 'joint coordinates, accuracy; not with contacts, whose restitution would depend on the speed'),
         'CPodes': (TOLERANCES, 'as before, BDF'),
         'SemiExplicitEuler': (STEPS, 'rigid contacts, the impulse solver PLUS; thresholds of speeds 1e-6 m/s'),
-        'SemiExplicitEuler, PGS': (STEPS, 'the impulse solver PGS')}),
+        'SemiExplicitEuler, PGS': (STEPS, 'the impulse solver PGS'),
+        'SemiExplicitEuler, no projection': (STEPS, 'positions stay as the velocities move them')}),
     'Siconos': ('siconos_peer', 'libsiconos-mechanics-dev', {
         'Moreau-Jean': (STEPS, 'theta 1/2, Gauss-Seidel and Newton to 1e-12, contacts at exact points'),
         'Moreau-Jean, projection': (STEPS, 'as before, positions projected onto the constraints')}),

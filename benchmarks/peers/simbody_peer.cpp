@@ -39,6 +39,8 @@ class Simbody {
       euler_->setConstraintTolerance(1e-9);
       if (setting.find("PGS") != std::string::npos)
         euler_->setImpulseSolverType(st::SemiExplicitEulerTimeStepper::PGS);
+      if (setting.find("no projection") != std::string::npos)
+        euler_->setPositionProjectionMethod(st::SemiExplicitEulerTimeStepper::NoPositionProjection);
       euler_->initialize(state);
       return;
     }
