@@ -23,8 +23,9 @@ constexpr std::size_t kManyBodies = 300;
 
 /// Rows of unit length of which those before them leave no more than this depend on these.
 constexpr double kDependentRow = 1e-10;
-/// A time so near to the boundary of a step, in steps, is that of the boundary up to rounding.
-constexpr double kSameBoundary = 1e-9;
+/// Figures of a scene that differ by no more are the same but for rounding: relative to their size,
+/// in m or rad, or in steps.
+constexpr double kSameFigure = 1e-9;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

@@ -133,7 +133,7 @@ inline Comparison compare(const Problem& p, Law law, unsigned seed, double h = 1
                       row_w.cwiseAbs().dot(f.velocities.cwiseAbs());
   out.transposed = size > 0 ? std::abs(left - product(gradient, v)) / size : 0;
   out.unique = report.status == DerivativeStatus::unique;
-  if (!report.strictly_regular || !(out.unique || report.velocities_unique)) return out;
+  if (!report.strictly_regular() || !(out.unique || report.velocities_unique)) return out;
   out.residual = f.residual;
   // Smaller steps where a kink is near; none where that leaves no digits.
   const auto same = [&](const Solution& t, const Problem& q) {

@@ -79,7 +79,7 @@ TEST_CASE("cone derivative: blocks alone have the slopes of their closed forms")
   const ConeSolution s = tight(p);
   REQUIRE(s.status == Status::solved);
   const Derivative D = derivative(p, s.impulses);
-  CHECK(D.report().strictly_regular);
+  CHECK(D.report().strictly_regular());
   ProblemDirection v;
   v.rolling = v.torsional = VectorXd::Ones(1);
   const SolutionDirection dx = D.forward(v);
@@ -99,7 +99,7 @@ TEST_CASE("cone derivative: one block of each against differences, and its trans
     const ConeSolution s = tight(p);
     REQUIRE(s.error < 1e-12);
     const Derivative D = derivative(p, s.impulses);
-    if (!D.report().strictly_regular) continue;
+    if (!D.report().strictly_regular()) continue;
     for (std::size_t k = 0; k < d.cones.size(); ++k)
       ++regimes[static_cast<int>(D.report().regimes[k])];
     std::mt19937 g(seed + 1000);
@@ -186,7 +186,7 @@ TEST_CASE("cone derivative: free rows alone are a linear solve, and bad argument
   const Eigen::Vector2d b(1, -2);
   const ConeProblem p = ConeProblem::dense(A, b, {Cone::free(2)});
   const Derivative D = derivative(p, tight(p).impulses);
-  CHECK(D.report().strictly_regular);
+  CHECK(D.report().strictly_regular());
   ProblemDirection v;
   v.b = Eigen::Vector2d(0.5, 1);
   CHECK((D.forward(v).impulses - A.inverse() * v.b).norm() < 1e-13);
@@ -199,5 +199,5 @@ TEST_CASE("cone derivative: free rows alone are a linear solve, and bad argument
   CHECK_THROWS_WITH(derivative(p, Eigen::Vector2d(1, 1)), Contains("they are no solution"));
   const ConeProblem kinked =
       ConeProblem::dense(MatrixXd::Ones(1, 1), VectorXd::Zero(1), {Cone::nonnegative()});
-  CHECK_FALSE(derivative(kinked, VectorXd::Zero(1)).report().strictly_regular);
+  CHECK_FALSE(derivative(kinked, VectorXd::Zero(1)).report().strictly_regular());
 }

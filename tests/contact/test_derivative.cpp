@@ -82,7 +82,7 @@ TEST_CASE("derivative: a contact that sticks follows A dx = db - dA x, mu does n
   for (Law law : {Law::maximum_dissipation, Law::coulomb}) {
     const Derivative d = one.at(law);
     CHECK(d.report().regimes[0] == Regime::sticking);
-    CHECK(d.report().strictly_regular);
+    CHECK(d.report().strictly_regular());
     CHECK(d.report().rank == 3);
     const Vector3d db(0.3, -0.2, 0.5);
     const SolutionDirection f = d.forward(of_b(db));
@@ -102,7 +102,7 @@ TEST_CASE("derivative: a contact that parts has none, its velocity follows b") {
   for (Law law : kLaws) {
     const Derivative d = one.at(law);
     CHECK(d.report().regimes[0] == Regime::separating);
-    CHECK(d.report().strictly_regular);
+    CHECK(d.report().strictly_regular());
     const SolutionDirection f = d.forward(of_b({1, 2, 3}));
     CHECK(f.impulses.norm() == 0);
     CHECK(f.velocities == VectorXd(-Vector3d(1, 2, 3)));
@@ -271,7 +271,7 @@ TEST_CASE("derivative: kinks are named with the branch and the other regime") {
       one.b = k.b;
       one.mu = k.mu;
       const Derivative d = one.at(law);
-      CHECK_FALSE(d.report().strictly_regular);
+      CHECK_FALSE(d.report().strictly_regular());
       REQUIRE(d.report().kinks.size() == 1);
       const Kink& found = d.report().kinks[0];
       CHECK(found.contact == 0);

@@ -82,7 +82,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!(result.time >= 0 && result.time <= 2 * kEnd + step)) found("a time", result.time);
     for (const Judgement& each : result.judgements)
       for (const double x : each.value)
-        if (each.met && std::isnan(x)) found("an expectation met by", x);
+        if (each.verdict == Verdict::met && std::isnan(x)) found("an expectation met by", x);
   } catch (const SceneError&) {
   } catch (const std::invalid_argument&) {
   } catch (const std::runtime_error&) {

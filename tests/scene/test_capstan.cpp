@@ -48,6 +48,15 @@ double down(const Engine& engine) { return -2 - engine.bodies()[0].position.z();
 double fall(const Engine& engine) { return -engine.bodies()[0].velocity.z(); }
 SpringForce rope(const Engine& engine) { return engine.forces().springs[0]; }
 
+constexpr double kRadius = 0.1, kInertia = 0.02;
+std::string pulley_at(int x) {
+  return fmt::format(
+      "[[body]]\nname = \"pulley\"\nmass = 1\ninertia = [0.05, {1}, 0.05]\n"
+      "position = [{0}, 0, 0]\n[[joint]]\nname = \"axle\"\nkind = \"hinge\"\n"
+      "bodies = [\"pulley\", \"world\"]\nat = [{0}, 0, 0]\naxis = [0, 1, 0]\n",
+      x, kInertia);
+}
+
 TEST_CASE("a rope over a drum holds two weights as long as e^(mu pi) is above their ratio") {
   const double least = std::log(kHeavy / kLight) / M_PI;
   for (const EngineKind kind : kBoth) {
@@ -118,19 +127,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a pulley that turns: the rope slips against its rim, or drives it as a belt") {
-  constexpr double kRadius = 0.1, kInertia = 0.02;
-  const char* const pulley = R"(
-[[body]]
-name = "pulley"
-mass = 1
-inertia = [0.05, 0.02, 0.05]
-[[joint]]
-name = "axle"
-kind = "hinge"
-bodies = ["pulley", "world"]
-at = [0, 0, 0]
-axis = [0, 1, 0]
-)";
+  const std::string pulley = pulley_at(0);
   const double held = kFall * (kHeavy - kLight) / (kHeavy + kLight + kInertia / kRadius / kRadius);
   const double ratio = kHeavy * (kFall - held) / (kLight * (kFall + held));
   for (const double mu : {0.8 * std::log(ratio) / M_PI, 1.2 * std::log(ratio) / M_PI}) {
@@ -140,8 +137,8 @@ axis = [0, 1, 0]
     const double turns = (first - second) * kRadius / kInertia;
     CHECK((slips ? turns * kRadius < a : std::abs(turns * kRadius - a) < 1e-12));
     for (const EngineKind kind : kBoth) {
-      const auto run = engine_of(scene_of(atwood(mu, first + second, 0, pulley, "pulley")), kind,
-                                 accuracy(kind));
+      const auto run = engine_of(scene_of(atwood(mu, first + second, 0, pulley.c_str(), "pulley")),
+                                 kind, accuracy(kind));
       run->advance(0.8);
       INFO(run->name() << " " << mu);
       CHECK(std::abs(fall(*run) - 0.8 * a) < 1e-6);
@@ -260,20 +257,7 @@ TEST_CASE("a rope comes to rest on two drums, and holds there") {
 }
 
 TEST_CASE("a rope slips on one drum and turns the other one, on which it holds") {
-  constexpr double kRadius = 0.1, kInertia = 0.02;
-  const char* const pulley = R"(
-[[body]]
-name = "pulley"
-mass = 1
-inertia = [0.05, 0.02, 0.05]
-position = [1, 0, 0]
-[[joint]]
-name = "axle"
-kind = "hinge"
-bodies = ["pulley", "world"]
-at = [1, 0, 0]
-axis = [0, 1, 0]
-)";
+  const std::string pulley = pulley_at(1);
   const double E = std::exp(0.5 * M_PI * 0.1), inert = kInertia / kRadius / kRadius;
   const double a = kFall * (kHeavy / E - kLight) / (kHeavy / E + kLight + inert);
   const double first = kHeavy * (kFall - a), middle = first / E, second = kLight * (kFall + a);
@@ -289,7 +273,7 @@ axis = [0, 1, 0]
         "{{ ring = 2, friction = {}, radius = {}, axis = [0, 1, 0] }}, {{ ring = 1, friction = 0.1 "
         "}}",
         mu, kRadius);
-    const Scene scene = scene_of(on_two_drums(capstans, T_0 + T_2, 0, pulley, "pulley"));
+    const Scene scene = scene_of(on_two_drums(capstans, T_0 + T_2, 0, pulley.c_str(), "pulley"));
     for (const EngineKind kind : kBoth) {
       const auto run = engine_of(scene, kind, accuracy(kind));
       run->advance(0.8);

@@ -514,7 +514,7 @@ rest = 1.6076
   const RunResult result = run(s);
   CHECK(result.engine == "event");
   CHECK(result.failure.empty());
-  for (const Judgement& each : result.judgements) CHECK(each.met);
+  for (const Judgement& each : result.judgements) CHECK(each.verdict == Verdict::met);
   // At the start, and at the end.
   for (const char* frame : {"000000", "000004"}) {
     CAPTURE(frame);

@@ -114,15 +114,14 @@ TEST_CASE("expectations that hold and that do not") {
   const RunResult result = run(scene);
   REQUIRE(result.failure.empty());
   REQUIRE(result.judgements.size() == 7);
-  CHECK(result.judgements[0].met);
-  CHECK_FALSE(result.judgements[1].met);
-  CHECK(result.judgements[2].met);
-  CHECK_FALSE(result.judgements[3].met);
-  CHECK(result.judgements[4].met);
-  CHECK_FALSE(result.judgements[5].met);
+  CHECK(result.judgements[0].verdict == Verdict::met);
+  CHECK(result.judgements[1].verdict == Verdict::missed);
+  CHECK(result.judgements[2].verdict == Verdict::met);
+  CHECK(result.judgements[3].verdict == Verdict::missed);
+  CHECK(result.judgements[4].verdict == Verdict::met);
+  CHECK(result.judgements[5].verdict == Verdict::missed);
   CHECK(result.judgements[5].time == 0);
-  CHECK(result.judgements[6].met);
-  for (const Judgement& each : result.judgements) CHECK(each.judged);
+  CHECK(result.judgements[6].verdict == Verdict::met);
   CHECK_FALSE(result.met());
   CHECK(result.time == Approx(0.5));
 }

@@ -167,8 +167,7 @@ TEST_CASE("what is no number is never met") {
     const Still well;
     judge.judge(1, true, well, 0);  // and right again at the end
     for (const Judgement& j : judge.judgements()) {
-      CHECK(j.judged);
-      CHECK_FALSE(j.met);
+      CHECK(j.verdict == Verdict::missed);
     }
   }
 }
@@ -222,7 +221,7 @@ TEST_CASE("a restart of a run that is over judges it as that run did") {
     CHECK(again.met() == first.met());
     CHECK(first.met() == (within == 1e-3));
     REQUIRE(again.judgements.size() == 1);
-    CHECK(again.judgements[0].judged);
+    CHECK(again.judgements[0].verdict != Verdict::open);
     CHECK(again.judgements[0].value == first.judgements[0].value);
     CHECK(again.summary.end_energy == first.summary.end_energy);
     CHECK(looks == 1);

@@ -18,9 +18,6 @@ namespace {
 
 using linalg::at;
 
-// Relative to |M|. Problem files of other programs hold six digits or fewer.
-constexpr double kUnsymmetric = 1e-2;
-
 [[noreturn]] void fail(const std::string& what) { throw std::invalid_argument(what); }
 
 std::string block(int k) { return "block " + std::to_string(k) + ": "; }
@@ -92,7 +89,8 @@ void factor_mass(const std::vector<Eigen::Triplet<double>>& entries, Eigen::Inde
   if ((above.norm() == 0) != (below.norm() == 0)) {
     M = (M + Sparse((above + below).transpose())).eval();
   } else {
-    symmetric = (M - other).norm() <= kUnsymmetric * M.norm();
+    // Problem files of other programs hold six digits or fewer.
+    symmetric = (M - other).norm() <= 1e-2 * M.norm();
     M = (0.5 * (M + other)).eval();
   }
   if (symmetric) factor.compute(M);

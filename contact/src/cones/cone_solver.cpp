@@ -15,10 +15,6 @@ using linalg::at;
 
 namespace {
 
-// The contacts of the embedding have scales of their own, so a solution of them may leave a larger
-// residual in the rows. It is then solved again with a smaller tolerance, so often at most.
-constexpr int kTries = 3;
-
 // Sets impulses of islands to zero in which no block needs any. A start may have small ones there,
 // which the relative tolerance of the island would not remove.
 Eigen::VectorXd without_idle(const ConeProblem& problem, Eigen::VectorXd x) {
@@ -82,6 +78,8 @@ void ConeSolver::Implementation::report(const Solution& found, ConeSolution& out
   }
 }
 
+// The contacts of the embedding have scales of their own, so a solution of them may leave a larger
+// residual in the rows. It is then solved again with a smaller tolerance, three times at most.
 ConeSolution ConeSolver::Implementation::solve(const ConeProblem& problem,
                                                const linalg::VectorView* start) {
   detail::require_law(problem, options.law);
@@ -111,7 +109,7 @@ ConeSolution ConeSolver::Implementation::solve(const ConeProblem& problem,
     }
     judge(problem, embedding, out);
     if (!found.replaced.empty()) out.error = found.error;
-    if (out.error <= options.tolerance || found.status != Status::solved || tries == kTries ||
+    if (out.error <= options.tolerance || found.status != Status::solved || tries == 3 ||
         contacts.contacts() == 0 || !out.contradicting.empty())
       break;
     tolerance *= std::max(0.01, 0.5 * options.tolerance / out.error);

@@ -15,7 +15,6 @@ using linalg::at;
 // The shift eps of the proximal steps, for a matrix with a unit diagonal. Components with singular
 // values above it converge in a few steps. In the null space of A rounding grows to 1e-16 / eps.
 constexpr double kProximal = 1e-8;
-constexpr int kSteps = 40;
 
 }  // namespace
 
@@ -73,7 +72,7 @@ Eigen::VectorXd FreeRows::solve(const Eigen::VectorXd& of) const {
   const Eigen::VectorXd g = scale_.cwiseProduct(of);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size()), r = g, best = x;
   double least = r.stableNorm();
-  for (int step = 0; step < kSteps && least > 0; ++step) {
+  for (int step = 0; step < 40 && least > 0; ++step) {
     x += factor_.solve(r);
     r = g - A_ * x;
     const double now = r.stableNorm();

@@ -74,10 +74,9 @@ class SparseFactors final : public EquationFactors {
  private:
   template <bool kTransposed>
   void refine(PackedVector* y) {
-    constexpr int kRefinements = 2;
     std::copy(y, y + e_.size(), right_.begin());
     kTransposed ? lu_.solve_transposed(y) : lu_.solve(y);
-    for (int k = 0; k < kRefinements; ++k) {
+    for (int k = 0; k < 2; ++k) {
       kTransposed ? e_.multiply_transposed(y, rest_.data()) : e_.multiply(y, rest_.data());
       for (std::size_t i = 0; i < rest_.size(); ++i)
         for (int c = 0; c < 3; ++c) rest_[i].v[c] = right_[i].v[c] - rest_[i].v[c];
@@ -212,13 +211,12 @@ namespace {
 
 // The part of a direction without symmetry that M^+ M removes: its component in the null space.
 double find_free_direction(IslandEquations& e) {
-  constexpr double kGolden = 0.6180339887498949;
   PackedVectors z(e.contacts.size());
   e.free.resize(z.size());
   double phase = 0, whole = 0, left = 0;
   for (PackedVector& v : z)
     for (int c = 0; c < 3; ++c) {
-      phase += kGolden;
+      phase += 0.6180339887498949;  // the golden ratio
       phase -= std::floor(phase);
       v.v[c] = phase - 0.5;
       whole += v.v[c] * v.v[c];
@@ -235,7 +233,6 @@ double find_free_direction(IslandEquations& e) {
 
 // The least singular value of M, by inverse iteration from the direction that M hardly sees.
 double least_singular_value(IslandEquations& e) {
-  constexpr int kSteps = 3;
   PackedVectors y = e.free;
   double length = 0;
   const auto normalise = [&] {
@@ -247,7 +244,7 @@ double least_singular_value(IslandEquations& e) {
       for (double& c : v.v) c /= length;
   };
   normalise();
-  for (int k = 0; k < kSteps && length > 0; ++k) {
+  for (int k = 0; k < 3 && length > 0; ++k) {
     e.factors->solve_transposed(y.data());
     e.factors->solve(y.data());
     normalise();
@@ -258,10 +255,9 @@ double least_singular_value(IslandEquations& e) {
 }  // namespace
 
 void IslandEquations::factor(double rank_tolerance) {
-  constexpr int kDense = 100, kDenseDeficient = 400;  // contacts
   constexpr double kLost = 1e-5;  // of a known solution: M is singular to working precision
   deficiency = 0;
-  if (size() > kDense) {
+  if (size() > 100) {
     factors = sparse_factors(*this);
     if (factors && find_free_direction(*this) <= kLost &&
         least_singular_value(*this) > rank_tolerance) {
@@ -269,7 +265,7 @@ void IslandEquations::factor(double rank_tolerance) {
       return;
     }
   }
-  if (size() <= kDenseDeficient) {
+  if (size() <= 400) {
     factors = dense_factors(*this, rank_tolerance);
     deficiency = factors->deficiency();
     if (deficiency > 0) find_free_direction(*this);

@@ -112,7 +112,6 @@ void SolutionDerivative::linearise(const DerivativeOptions& options) {
       for (int c = 0; c < 2; ++c) to.coupling[r][c] = t.coupling[r][c] * f;
     }
   }
-  report_.strictly_regular = report_.kinks.empty();
 }
 
 // Touching contacts that blocks of A connect.
@@ -218,7 +217,7 @@ void SolutionDerivative::advise() {
   const auto add = [&](const std::string& sentence) {
     report_.advice += (report_.advice.empty() ? "" : " ") + sentence;
   };
-  if (!report_.strictly_regular)
+  if (!report_.strictly_regular())
     add(std::to_string(report_.kinks.size()) +
         " contacts lie at kinks: the derivative is that of the branch in `regimes`; beyond, "
         "another "

@@ -147,8 +147,7 @@ namespace {
 constexpr long kMost = std::numeric_limits<int>::max();
 // The rest of the file bounds the entries that it may claim: the shortest takes two bytes.
 void claim(Tokens& in, long count, long each = 1) {
-  constexpr long kNumber = 2;
-  if (count > in.left() / (kNumber * each) + 1) in.fail("truncated: the file ends in the matrix");
+  if (count > in.left() / (2 * each) + 1) in.fail("truncated: the file ends in the matrix");
 }
 
 std::vector<MatrixEntry> read_dense(Tokens& in, long rows, long columns) {
@@ -260,12 +259,11 @@ FileMatrix read_matrix(Tokens& in) {
 }  // namespace
 
 FileProblem read_dat(const std::string& path) {
-  constexpr long kMostContacts = 10'000'000;
   Tokens in(path);
   FileProblem out;
   out.dimension = static_cast<int>(in.integer("dimension", 2, 5));
   if (out.dimension == 4) in.fail("dimension is 4; 2, 3 or 5 is expected");
-  const long n = in.integer("number of contacts", 0, kMostContacts), size = out.dimension * n;
+  const long n = in.integer("number of contacts", 0, 10'000'000), size = out.dimension * n;
   out.A = read_matrix(in);
   const auto need = [&](const char* what, const FileMatrix& M, long rows, long columns) {
     if (M.rows != rows || M.columns != columns)
@@ -276,21 +274,21 @@ FileProblem read_dat(const std::string& path) {
   need("the matrix", out.A, out.A.rows, out.A.rows);
   const long coefficients = out.dimension == 5 ? 2 : 1;
   // Both begin alike; a global file has a matrix more.
-  out.local = out.A.rows == size && in.words_left() <= size + coefficients * n + 1;
-  if (!out.local) {
+  const bool local = out.A.rows == size && in.words_left() <= size + coefficients * n + 1;
+  if (!local) {
     const FileMatrix H = read_matrix(in);
     need("H", H, out.A.rows, size);
     out.J = H.transposed();
   }
-  const long words = (out.local ? 0 : out.A.rows) + size + coefficients * n;
+  const long words = (local ? 0 : out.A.rows) + size + coefficients * n;
   if (in.words_left() < words) in.fail("truncated: the file ends in its vectors");
   const auto vector = [&](const char* what, long count) {
     linalg::VectorX v(count);
     for (long i = 0; i < count; ++i) v[i] = in.finite(what);
     return v;
   };
-  if (!out.local) out.f = vector("q", out.A.rows);
-  out.q = vector(out.local ? "q" : "b", size);
+  if (!local) out.f = vector("q", out.A.rows);
+  out.q = vector(local ? "q" : "b", size);
   out.mu = vector("mu", n);
   if (out.dimension == 5) out.rolling = vector("mu_r", n);
   if (!in.empty())

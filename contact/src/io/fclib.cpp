@@ -219,11 +219,11 @@ FileProblem detail::read_fclib(const std::string& path) {
   if (file < 0) throw std::runtime_error(path + ": not an HDF5 file, or truncated");
   const bool rolling = has(file, "fclib_global_rolling");
   FileProblem out;
-  out.local = !rolling && (has(file, "fclib_local") || !has(file, "fclib_global"));
+  const bool local = !rolling && (has(file, "fclib_local") || !has(file, "fclib_global"));
   const Group group(file, path,
-                    rolling     ? "fclib_global_rolling/"
-                    : out.local ? "fclib_local/"
-                                : "fclib_global/");
+                    rolling ? "fclib_global_rolling/"
+                    : local ? "fclib_local/"
+                            : "fclib_global/");
   const int d = out.dimension = group.integer("spacedim");
   if (rolling ? d != 5 : d != 2 && d != 3) group.fail("spacedim is " + std::to_string(d));
   out.mu = group.vector("mu");
@@ -235,11 +235,11 @@ FileProblem detail::read_fclib(const std::string& path) {
     if (joints > std::numeric_limits<int>::max() - rows)
       group.fail("has " + std::to_string(joints) + " rows of joints, more than there can be");
     out.joints = static_cast<int>(joints);
-    (out.local ? out.A : out.J).put(of, rows, 0);
+    (out.is_local() ? out.A : *out.J).put(of, rows, 0);
     out.q.conservativeResize(rows + joints);
     out.q.tail(joints) = group.vector(vector, joints);
   };
-  if (out.local) {
+  if (local) {
     out.A = group.matrix("W");
     group.need("W", out.A, rows, rows);
     out.q = group.vector("q", rows);

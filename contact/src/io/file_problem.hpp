@@ -1,6 +1,7 @@
 // Tether: what files of contact problems say. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tether/contact/files.hpp>
@@ -31,10 +32,11 @@ struct FileMatrix {
 struct FileProblem {
   int dimension = 3;  ///< 2; 3; 5: with moments of rolling friction
   int joints = 0;
-  bool local = true;
-  FileMatrix A, J;
+  FileMatrix A;
+  std::optional<FileMatrix> J;  ///< of a global one
   linalg::VectorX f, q, mu, rolling;
 
+  bool is_local() const { return !J; }
   int contacts() const { return static_cast<int>(mu.size()); }
   int rows() const { return dimension * contacts() + joints; }
 };

@@ -26,7 +26,7 @@ bool is_hdf5(const std::string& path) {
 
 Problem problem_of(const detail::FileProblem& file) {
   if (file.joints > 0) throw std::invalid_argument("has rows of joints, which read_cones() reads");
-  if (!file.local || file.dimension > 3)
+  if (!file.is_local() || file.dimension > 3)
     throw std::invalid_argument(
         "is global or has rolling friction: read_cones() reads it, not read_problem()");
   const int d = file.dimension;
@@ -51,8 +51,8 @@ ConeProblem cones_of(const detail::FileProblem& file) {
                     : file.dimension == 3 ? Cone::friction(file.mu[k])
                                           : Cone::with_rolling(file.mu[k], file.rolling[k]));
   if (file.joints > 0) cones.push_back(Cone::free(file.joints));
-  if (file.local) return ConeProblem::sparse(file.A.entries, -file.q, std::move(cones));
-  return ConeProblem::saddle(file.A.entries, file.J.entries, file.f, file.q, std::move(cones));
+  if (file.is_local()) return ConeProblem::sparse(file.A.entries, -file.q, std::move(cones));
+  return ConeProblem::saddle(file.A.entries, file.J->entries, file.f, file.q, std::move(cones));
 }
 
 template <class F>

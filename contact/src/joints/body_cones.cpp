@@ -19,8 +19,6 @@ namespace {
 // A direction is held by the joints if A is less than this part of A without joints there. Both are
 // squares of lengths; rounding leaves a length of about 1e-14.
 constexpr double kHeld = 1e-14;
-constexpr std::size_t kFew = 20;  // cones whose dense factors cost little beside their solve
-constexpr double kSoft = 1e-5;    // compliance of a support over what moves there without joints
 
 using linalg::at;
 
@@ -163,8 +161,9 @@ void BodyCones::find_islands(const Mechanisms& mechanisms, const std::vector<Bod
   start_.push_back(n);
 }
 
-// Lists the moving bodies of the island's cones, by node, then by cone.
-void BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
+// Lists the moving bodies of the island's cones, by node, then by cone. Returns whether it has a
+// mechanism.
+bool BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
   sides_.clear();
   alone_.clear();
   for (std::size_t l = 0; l < members_.size(); ++l) {
@@ -182,7 +181,7 @@ void BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<Bo
   }
   std::stable_sort(sides_.begin(), sides_.end(),
                    [](const Side& a, const Side& b) { return a.node < b.node; });
-  jointed_ = !sides_.empty() && sides_.front().node < mechanisms.count();
+  return !sides_.empty() && sides_.front().node < mechanisms.count();
 }
 
 // Adds the blocks of A of one mechanism, sides begin .. end: the response of the mechanism to unit
@@ -226,9 +225,6 @@ void BodyCones::assemble(Mechanisms& mechanisms, const std::vector<BodyCone>& co
 // Leaves out contacts whose normal velocity no impulse changes, and removes from A the directions
 // of slip and of moments that the joints hold: there a solve would divide rounding by rounding.
 void BodyCones::leave_out_held(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v) {
-  kept_.assign(members_.size(), 1);
-  held_.clear();
-  if (!jointed_) return;
   std::vector<Block> own(members_.size()), clear(members_.size());
   for (std::size_t l = 0; l < own.size(); ++l) own[l].setZero(alone_[l].size(), alone_[l].size());
   for (const Entry& e : A_)
@@ -280,7 +276,7 @@ Eigen::VectorXd BodyCones::approach(int place, const BodyCone& c,
 }
 
 void BodyCones::solve_island(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v,
-                             linalg::VectorX& x) {
+                             bool jointed, linalg::VectorX& x) {
   std::vector<Cone> kept;
   std::vector<int> row(members_.size(), -1);
   linalg::VectorX b(x.size()), start(x.size()), soft(x.size());
@@ -297,7 +293,7 @@ void BodyCones::solve_island(const std::vector<BodyCone>& cones, const std::vect
     kept.push_back(c.cone);
     b.segment(n, rows) = approach(static_cast<int>(l), c, v);
     start.segment(n, rows) = x.segment(row_[at(cone)], rows);
-    soft.segment(n, rows) = kSoft * alone_[l];
+    soft.segment(n, rows) = 1e-5 * alone_[l];
     each_part(c.cone.kind, [&](int from, int count) {
       soft.segment(n + from, count).setConstant(soft.segment(n + from, count).mean());
     });
@@ -318,7 +314,8 @@ void BodyCones::solve_island(const std::vector<BodyCone>& cones, const std::vect
       }
   }
   const ConeProblem problem = ConeProblem::sparse(A, b, kept);
-  if (jointed_ && kept.size() <= kFew &&
+  // Dense factors of few cones cost little beside their solve.
+  if (jointed && kept.size() <= 20 &&
       !(evaluate(problem, options_.law, start).error <= options_.tolerance) &&
       share_loads(problem) && !hold_all(problem, options_.tolerance, start)) {
     // Contacts that slide share their loads as soft supports of one kind would.
@@ -373,10 +370,12 @@ const BodyCones::Result& BodyCones::solve(Mechanisms& mechanisms,
   find_islands(mechanisms, cones);
   for (std::size_t k = 0; k + 1 < start_.size(); ++k) {
     members_.assign(order_.begin() + start_[k], order_.begin() + start_[k + 1]);
-    collect_sides(mechanisms, cones);
+    const bool jointed = collect_sides(mechanisms, cones);
     assemble(mechanisms, cones);
-    leave_out_held(cones, v);
-    solve_island(cones, v, x);
+    kept_.assign(members_.size(), 1);
+    held_.clear();
+    if (jointed) leave_out_held(cones, v);
+    solve_island(cones, v, jointed, x);
     apply(mechanisms, x, v);
     ++result_.islands;
   }

@@ -90,13 +90,13 @@ class BodyCones {
     return m >= 0 ? m : mechanisms.count() + body;
   }
   void find_islands(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
-  void collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
+  bool collect_sides(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
   void assemble(Mechanisms& mechanisms, const std::vector<BodyCone>& cones);
   void add_mechanism(Mechanisms& mechanisms, std::size_t begin, std::size_t end);
   void leave_out_held(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v);
   Eigen::VectorXd approach(int place, const BodyCone& cone, const std::vector<Vector6d>& v) const;
   void solve_island(const std::vector<BodyCone>& cones, const std::vector<Vector6d>& v,
-                    linalg::VectorX& x);
+                    bool jointed, linalg::VectorX& x);
   void apply(Mechanisms& mechanisms, const linalg::VectorX& x, std::vector<Vector6d>& v);
 
   Options options_;
@@ -105,12 +105,11 @@ class BodyCones {
   linalg::DisjointSets sets_;                  // of mechanisms and single bodies
   std::vector<int> row_;                       // of each cone: its first row in x
   std::vector<int> first_of_, order_, start_;  // cones island by island
-  // The present island: its cones, which of them are solved, their sides, whether it has a
-  // mechanism, A, and the diagonal of A without joints by cone and row.
+  // The present island: its cones, which of them are solved, their sides, A, and the diagonal of A
+  // without joints by cone and row.
   std::vector<int> members_;
   std::vector<char> kept_;
   std::vector<Side> sides_;
-  bool jointed_ = false;
   std::vector<Entry> A_;
   std::vector<BodyCone::Column> alone_;
   std::vector<Held> held_;

@@ -38,14 +38,14 @@ Vector3d in_circle(const std::array<Vector3d, 2>& tangents, const Vector3d& norm
 
 }  // namespace
 
-ConeIslands::ConeIslands(Mechanisms& mechanisms, LawRows* laws, LawUse use,
-                         const BodyOptions& options, const NearContacts* near,
-                         std::vector<Vector3d>& moments)
-    : mechanisms_(mechanisms),
-      laws_(laws),
+void ConeSources::hold_moments(const NearContacts& of) { near = &of; }
+
+ConeIslands::ConeIslands(ConeSources& sources, LawUse use, const BodyOptions& options)
+    : mechanisms_(sources.mechanisms),
+      laws_(sources.laws ? &*sources.laws : nullptr),
       use_(use),
-      near_(near),
-      moments_(use == LawUse::all ? moments : own_),
+      near_(use == LawUse::limits ? nullptr : sources.near),
+      moments_(use == LawUse::all ? sources.moments : own_),
       solver_(solver_options(options)) {}
 
 void ConeIslands::set_options(const BodyOptions& options) {
@@ -191,12 +191,6 @@ void ConeIslands::remember_cones(const std::vector<PointContact>& contacts,
   if (near_ != nullptr)
     for (std::size_t k = 0; k < contacts.size(); ++k)
       if (!moments_[k].isZero(0)) memory.add(moment_id(contacts[k].id), moments_[k]);
-}
-
-// Position corrections have no friction.
-std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions& options, LawUse laws) {
-  if (laws == LawUse::limits) return nullptr;
-  return std::make_unique<ConeIslands>(mechanisms_, nullptr, laws, options, &near_, moments);
 }
 
 }  // namespace tether::contact::detail

@@ -2,7 +2,9 @@
 // BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <tether/linalg/disjoint_sets.hpp>
+#include <utility>
 #include <vector>
 
 #include "joints/body_cones.hpp"
@@ -19,21 +21,35 @@ constexpr std::uint64_t moment_id(std::uint64_t contact) {
                     static_cast<int>(contact & 0xffff));
 }
 
-/// Solves islands that have a mechanism, or contacts with rolling, torsional or elliptic friction.
 class ImpulseHistory;
 
-class ConeIslands final : public JointIslands {
- public:
-  /// The mechanisms belong to the joints of the stepper, which update them; without joints `laws`
-  /// is null. near: meetings whose contacts hold moments or have elliptic friction; null: none.
-  /// moments: receives the moments of all contacts of a solve of a step's velocities, world axes,
-  /// N m s.
-  ConeIslands(Mechanisms& mechanisms, LawRows* laws, LawUse use, const BodyOptions& options,
-              const NearContacts* near, std::vector<Eigen::Vector3d>& moments);
+/// Joints, their laws and meetings of materials, which make islands of a step more than friction
+/// cones: shared by all its solvers.
+struct ConeSources {
+  Mechanisms mechanisms;               ///< without joints: none
+  std::optional<LawRows> laws;         ///< with joints only
+  const NearContacts* near = nullptr;  ///< contacts with moments or elliptic friction; null: none
+  std::vector<std::pair<int, int>> links;  ///< connect the bodies of each mechanism
+  std::vector<int> under_laws;             ///< bodies of mechanisms that have laws
+  /// Moments of rolling and torsional friction in the last problem of a step's velocities: one for
+  /// each contact, world axes, N m s.
+  std::vector<Eigen::Vector3d> moments;
 
+  void hold_moments(const NearContacts& of);
+  /// Whether problems have such islands. Position corrections have no friction.
+  bool any(LawUse use) const { return laws || (near != nullptr && use != LawUse::limits); }
+};
+
+/// Solves islands that have a mechanism, or contacts with rolling, torsional or elliptic friction.
+class ConeIslands {
+ public:
+  ConeIslands(ConeSources& sources, LawUse use, const BodyOptions& options);
+
+  /// As BodySolver::solve, which `others` is, for all other islands. Its memory has the impulses of
+  /// all contacts. Joints keep the velocities that they have: v+ - v satisfies G (v+ - v) = 0.
   void solve(BodySolver& others, const std::vector<RigidBody>& bodies,
-             const std::vector<PointContact>& contacts, BodySolution& out) override;
-  void set_options(const BodyOptions& options) override;
+             const std::vector<PointContact>& contacts, BodySolution& out);
+  void set_options(const BodyOptions& options);
 
  private:
   bool rolls(const PointContact& c) const { return near_ != nullptr && near_->meeting(c).rolls(); }
@@ -49,7 +65,7 @@ class ConeIslands final : public JointIslands {
   void remember_cones(const std::vector<PointContact>& contacts, ImpulseHistory& memory) const;
 
   Mechanisms& mechanisms_;
-  LawRows* laws_;
+  LawRows* laws_;  // null: no joints
   LawUse use_;
   const NearContacts* near_;
   std::vector<Eigen::Vector3d> own_, &moments_;
@@ -67,16 +83,35 @@ class ConeIslands final : public JointIslands {
   std::vector<Vector6d> v_;
 };
 
-/// Rolling and elliptic friction in steps without joints; `near` must outlive it.
-class RollingPart final : public IslandMaker {
+/// A BodySolver, and ConeIslands where there are such.
+class StepSolver {
  public:
-  explicit RollingPart(const NearContacts& near) : near_(near) {}
+  StepSolver(const BodyOptions& options, ConeSources& sources, LawUse use) : solver_(options) {
+    if (sources.any(use)) cones_.emplace(sources, use, options);
+  }
 
-  std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
+  void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
+             BodySolution& out) {
+    if (cones_)
+      cones_->solve(solver_, bodies, contacts, out);
+    else
+      solver_.solve(bodies, contacts, out);
+  }
+  const BodyOptions& options() const { return solver_.options(); }
+  void set_options(const BodyOptions& options) {
+    solver_.set_options(options);
+    if (cones_) cones_->set_options(options);
+  }
+  void scale_warm_start(double factor) { solver_.scale_warm_start(factor); }
+  void take_back() { solver_.take_back(); }
+  void forget() { solver_.forget(); }
+  /// Impulses of all contacts.
+  WarmStart warm_start() const { return solver_.warm_start(); }
+  void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
 
  private:
-  const NearContacts& near_;
-  Mechanisms mechanisms_;  // none
+  BodySolver solver_;
+  std::optional<ConeIslands> cones_;
 };
 
 }  // namespace tether::contact::detail

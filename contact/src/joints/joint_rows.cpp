@@ -58,13 +58,13 @@ void JointLaws::add_limit(int joint, double gap, double restitution) {
   demand(std::isfinite(gap), joint, "gap", gap, "finite");
   demand(restitution >= 0 && restitution <= 1, joint, "restitution", restitution, "0 to 1");
   rows_.add(joint);
-  laws_.push_back({joint, true, gap, restitution, 0, 0});
+  laws_.push_back({joint, Law::Kind::limit, gap, restitution, 0, 0});
 }
 
 void JointLaws::add_bounded(int joint, double rate, double bound) {
   demand(bound >= 0 && std::isfinite(bound), joint, "bound", bound, ">= 0 and finite");
   rows_.add(joint, rate);
-  laws_.push_back({joint, false, 0, 0, rate, bound});
+  laws_.push_back({joint, Law::Kind::bounded, 0, 0, rate, bound});
 }
 
 void JointLaws::set_bound(int law, double bound) {
@@ -82,7 +82,7 @@ void JointLaws::add_sprung(int joint, double stretch, double stiffness, double d
          damping, ">= 0 and finite, and > 0 without stiffness");
   demand(bound >= 0, joint, "bound", bound, ">= 0");
   rows_.add(joint, rate);
-  laws_.push_back({joint, false, 0, 0, rate, bound, stretch, stiffness, damping});
+  laws_.push_back({joint, Law::Kind::sprung, 0, 0, rate, bound, stretch, stiffness, damping});
 }
 
 void JointLaws::on(int body, const Vector6d& G) { rows_.on(body, G); }

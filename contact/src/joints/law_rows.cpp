@@ -10,11 +10,6 @@ namespace tether::contact::detail {
 
 namespace {
 
-// Part of a displacement beyond a limit that a step reduces. It arises because rows of the start of
-// a step are exact to second order only.
-constexpr double kTakenBack = 0.2;
-constexpr double kHeldByBound = 1 - 1e-9;
-
 using linalg::at;
 
 }  // namespace
@@ -48,7 +43,7 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
   for (int k = 0; k < laws.count(); ++k) {
     const JointLaws::Law& law = laws[k];
     Row& row = rows_[at(k)];
-    if (!law.limit) {
+    if (!law.is_limit()) {
       // s' - rate + compliance x + stretch stiffness / (stiffness dt + damping)
       row.bias = -law.rate;
       if (law.is_sprung()) {
@@ -63,8 +58,9 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
     if (hits)
       strikes.push_back(
           {law.gap, came, comes, moving_along(k), moving(k, mechanisms), law.restitution});
-    // On a turning body every step drives a joint at its limit a little beyond it.
-    const double beyond = kTakenBack * std::min(law.gap, 0.0) / dt;
+    // On a turning body every step drives a joint at its limit a little beyond it: rows of its
+    // start are exact to second order only. A fifth of that is taken back.
+    const double beyond = 0.2 * std::min(law.gap, 0.0) / dt;
     row.plastic_bias = hits || law.gap < 0 ? beyond : law.gap / dt;
     row.bias = hits ? std::min(-law.restitution * came, beyond) : row.plastic_bias;
   }
@@ -72,7 +68,7 @@ void LawRows::prepare(const std::vector<Vector6d>& v, double dt, const Mechanism
 
 BodyCone LawRows::cone(int law, LawUse use) const {
   const JointLaws::Law& each = laws[law];
-  BodyCone out(each.limit                  ? Cone::nonnegative()
+  BodyCone out(each.is_limit()             ? Cone::nonnegative()
                : std::isfinite(each.bound) ? Cone::bounded(each.bound * dt_)
                                            : Cone::free());
   out.compliance = rows_[at(law)].compliance;
@@ -93,7 +89,28 @@ BodyCone LawRows::cone(int law, LawUse use) const {
 
 double LawRows::start(int law, const Eigen::Vector3d* last) const {
   const double x = last != nullptr ? (*last)[0] : 0, N = laws[law].bound * dt_;
-  return laws[law].limit ? x : std::clamp(x, -N, N);
+  return laws[law].is_limit() ? x : std::clamp(x, -N, N);
+}
+
+void LawRows::add_bounded(bool without_restitution, const BodySet& bodies,
+                          std::vector<RigidBody>& change) const {
+  for (int k = 0; k < laws.count(); ++k) {
+    if (laws[k].is_limit()) continue;
+    const double x = (without_restitution ? plastic : impulses)[at(k)];
+    for (const JointRows::Term* t = laws.rows().begin(k); t != laws.rows().end(k); ++t) {
+      const RigidBody& body = bodies.motion[at(t->body)];
+      change[at(t->body)].velocity += x * body.inverse_mass * t->G.head<3>();
+      change[at(t->body)].angular_velocity += x * (body.inverse_inertia * t->G.tail<3>());
+    }
+  }
+}
+
+void LawRows::scale_restitution(const Mechanisms& mechanisms,
+                                const std::function<double(int)>& scale) {
+  for (int k = 0; k < laws.count(); ++k) {
+    const double s = scale(moving(k, mechanisms));
+    if (s < 1) impulses[at(k)] = plastic[at(k)] + s * (impulses[at(k)] - plastic[at(k)]);
+  }
 }
 
 LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
@@ -102,7 +119,7 @@ LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
   out.side = at_bound(law);
   out.impulse = impulses[at(law)];
   out.body = moving_along(law);
-  if (each.limit) return out;
+  if (each.is_limit()) return out;
   out.came = speed(law, coming_) - each.rate;
   out.left = speed(law, v) - each.rate;
   out.bound = each.bound * dt_;
@@ -111,9 +128,9 @@ LawState LawRows::state(int law, const std::vector<Vector6d>& v) const {
 
 // Sign of the impulse; 0: the bound does not hold it.
 int LawRows::at_bound(int law) const {
-  if (laws[law].limit) return 0;
+  if (laws[law].is_limit()) return 0;
   const double x = impulses[at(law)], N = laws[law].bound * dt_;
-  return std::abs(x) < kHeldByBound * N ? 0 : x > 0 ? 1 : -1;
+  return std::abs(x) < (1 - 1e-9) * N ? 0 : x > 0 ? 1 : -1;
 }
 
 }  // namespace tether::contact::detail

@@ -3,13 +3,36 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <tether/contact/joint_laws.hpp>
+#include <tether/contact/stepping.hpp>
 #include <vector>
 
 #include "joints/body_cones.hpp"
-#include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
+
+/// Which laws of joints (JointLaws) a problem includes: velocities: all; velocities without
+/// restitution: all, and limits do not bounce; closing of gaps: all, their impulses are discarded;
+/// correction of positions: limits; impacts: none.
+enum class LawUse { all, plastic, closing, limits, none };
+
+/// A limit of a joint that is struck within a sub-step.
+struct Strike {
+  double gap;          ///< m or rad, at the start of the part
+  double came, comes;  ///< approach before and with the forces of the part, > 0
+  int body;            ///< one that moves along; -1: the coordinate is an angle
+  int moves;           ///< a body of the law that moves
+  double restitution;  ///< of the limit
+};
+
+/// Record of what a law of a joint has done in a sub-step.
+struct LawState {
+  int side = 0;                   ///< sign of the impulse that its bound allows no more of; else 0
+  double came = 0, left = 0;      ///< speeds beside the wanted one, where the part began and ended
+  double impulse = 0, bound = 0;  ///< N s, N m s
+  int body = -1;                  ///< as of Strike
+};
 
 /// A limit is the cone x >= 0, a bounded law |x| <= bound dt, a sprung one a compliant row.
 class LawRows {
@@ -30,7 +53,7 @@ class LawRows {
 
   bool in(LawUse use, int law) const {
     return use == LawUse::all || use == LawUse::plastic || use == LawUse::closing ||
-           (use == LawUse::limits && laws[law].limit);
+           (use == LawUse::limits && laws[law].is_limit());
   }
   bool any(LawUse use) const { return active && use != LawUse::none && laws.count() > 0; }
   /// Identity in warm starts: one of a contact of a surface with itself, which there is not.
@@ -39,6 +62,12 @@ class LawRows {
   BodyCone cone(int law, LawUse use) const;
   /// Starting impulse from that of the last step; null: there is none.
   double start(int law, const Eigen::Vector3d* last) const;
+  /// Adds the velocities that motors and friction of joints have added in the last problem of
+  /// velocities, `without_restitution`: in that without, before joints pass them on.
+  void add_bounded(bool without_restitution, const BodySet& bodies,
+                   std::vector<RigidBody>& change) const;
+  /// Impulses of laws on body i are those without restitution and scale(i) of what it adds.
+  void scale_restitution(const Mechanisms& mechanisms, const std::function<double(int)>& scale);
   /// v: at the end of the sub-step.
   LawState state(int law, const std::vector<Vector6d>& v) const;
 

@@ -17,13 +17,6 @@ namespace tether::contact::detail {
 
 using linalg::at;
 
-namespace {
-
-// The squares of smaller speeds underflow, so that relative errors lose their meaning.
-constexpr double kLeastScale = 1e-150;
-
-}  // namespace
-
 Mechanism::Mechanism(std::vector<int> bodies, std::vector<int> rows, const JointRows& joints,
                      const std::vector<int>& place, const std::vector<char>& moves)
     : bodies_(std::move(bodies)),
@@ -233,9 +226,10 @@ void Mechanisms::find_contradicting(int m, const JointRows& joints, double scale
   for (std::size_t k = 0; k < mechanism.rows().size(); ++k) {
     const int i = static_cast<int>(k);
     const double norm = mechanism.row_norm(i);
-    const bool holds =
-        norm > 0 ? std::abs(mechanism.left(i)) <= std::max(kContradiction * scale, kLeastScale)
-                 : b_[k] == 0;  // a row of zeros
+    // The squares of smaller speeds underflow, so that relative errors lose their meaning.
+    const bool holds = norm > 0
+                           ? std::abs(mechanism.left(i)) <= std::max(kContradiction * scale, 1e-150)
+                           : b_[k] == 0;  // a row of zeros
     if (!holds) contradicting_.push_back(joints.joint(mechanism.rows()[k]));
   }
 }

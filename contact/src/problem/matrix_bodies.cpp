@@ -18,11 +18,6 @@ using linalg::at;
 using Block = Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>;
 
 constexpr double kRank = 1e-12;  // of the diagonal of A: what rounding leaves of dependent rows
-constexpr double kLeft = 1e-6;   // its root: what that leaves of a block that vanishes
-// Contacts at nearly the same point leave up to 1e-5 of A, and refinement finds all digits in as
-// many steps.
-constexpr double kExplained = 1e-4;
-constexpr std::size_t kOfPair = 2;  // contacts with as many velocities as two bodies
 
 bool is_zero(const PackedBlock& block) {
   return std::all_of(block.column, block.column + 12, [](double v) { return v == 0; });
@@ -33,8 +28,7 @@ bool is_zero(const PackedBlock& block) {
 template <typename Column>
 MatrixXd pivoted_cholesky(VectorXd left, Eigen::Index most, const VectorXd& least,
                           const Column& column, std::vector<int>* pivots = nullptr) {
-  constexpr Eigen::Index kOfBody = 6;
-  MatrixXd G(left.size(), std::min(most, kOfBody));
+  MatrixXd G(left.size(), std::min(most, Eigen::Index{6}));
   Eigen::Index rank = 0;
   for (; rank < most; ++rank) {
     Eigen::Index p;
@@ -55,7 +49,8 @@ class MatrixBodies {
   explicit MatrixBodies(const Problem& problem) : problem_(problem) { find_classes(); }
 
   bool have_fewer_velocities() const {
-    return kOfPair * classes_.size() <= at(problem_.contacts());
+    // Two contacts have as many velocities as two bodies.
+    return 2 * classes_.size() <= at(problem_.contacts());
   }
   BodyForm find() {
     rows_of_.resize(at(problem_.contacts()));
@@ -215,7 +210,7 @@ class MatrixBodies {
         auto block =
             turn.left.block(turn.start[r], turn.start[k], turn.start[r + 1] - turn.start[r],
                             turn.start[k + 1] - turn.start[k]);
-        if (block.cwiseAbs().maxCoeff() > kLeft * std::sqrt(size(r) * size(k)))
+        if (block.cwiseAbs().maxCoeff() > std::sqrt(kRank) * std::sqrt(size(r) * size(k)))
           turn.takes_body = false;
         else
           block.setZero();
@@ -323,7 +318,9 @@ bool explains(const BodyForm& form, const Problem& problem) {
       left += Block(problem.blocks()[at(k)].column) * Z[at(problem.columns()[at(k)])];
     for (int k = form.start[i]; k < form.start[i + 1]; ++k)
       left -= Block(form.H[at(k)].column) * P[at(form.node[at(k)])];
-    if (!(left.cwiseAbs().maxCoeff() <= kExplained * root(i) * (end - first))) return false;
+    // Contacts at nearly the same point leave up to 1e-5 of A, and refinement finds all digits in
+    // as many steps.
+    if (!(left.cwiseAbs().maxCoeff() <= 1e-4 * root(i) * (end - first))) return false;
   }
   return true;
 }

@@ -34,14 +34,14 @@ bool update_regime(const ProofIsland& island, int i, const Velocities& at_x, boo
 }  // namespace
 
 Candidate polish(const ProofIsland& island) {
-  constexpr int kPatience = 6;  // steps that do not halve the residual: regimes may still change
   // J may be singular. With J + tau I a step leaves tau / (sigma + tau) of the error at a singular
   // value sigma, and moves x by rounding / tau where sigma = 0.
   const double tau = std::sqrt(kUnit);
   Candidate point{island.x, std::vector<Regime>(at(island.contacts()))}, best = point;
   std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> lu;
   double least = kInfinity, last = kInfinity;
-  for (int idle = 0; idle < kPatience; ++idle) {
+  // Steps that do not halve the residual: regimes may still change.
+  for (int idle = 0; idle < 6; ++idle) {
     const Velocities at_x(island, {point.x, VectorXd::Zero(point.x.size())});
     bool changed = false;
     for (int i = 0; i < island.contacts(); ++i)
@@ -102,8 +102,7 @@ std::optional<Box> enclose_root(const ProofIsland& island, const Candidate& cand
   const VectorXd start =
       RF.cwiseAbs() + product_above(R, equations.radius() + gamma * F.cwiseAbs());
   VectorXd rho = 2 * start + VectorXd::Constant(m, kUnit);
-  constexpr int kInflations = 10;
-  for (int k = 0; k < kInflations && rho.maxCoeff() < 1; ++k) {
+  for (int k = 0; k < 10 && rho.maxCoeff() < 1; ++k) {
     const VectorXd rest = equations.remainder(rho, product_above(A, equations.scattered(rho)));
     VectorXd image = start + product_above(R, rest + gamma * product_above(J, rho)) +
                      product_above(G, rho) + gamma * rho;

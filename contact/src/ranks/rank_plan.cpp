@@ -16,9 +16,6 @@ using linalg::at;
 
 namespace {
 
-// A colour is balanced when no rank has more than this of its share, or when no chunk can move.
-constexpr double kUneven = 1.02;
-
 int most(const std::vector<int>& numbers) {
   return static_cast<int>(std::max_element(numbers.begin(), numbers.end()) - numbers.begin());
 }
@@ -111,9 +108,10 @@ void RankPlan::balance(int begin, int end, const std::vector<int>& owner) {
   }
   std::vector<std::vector<int>> of;  // of each chunk, when needed
   for (int moves = begin; moves < end; ++moves) {
+    // A colour is balanced when no rank has more than 1.02 of its share, or when no chunk can move.
     const int from = most(load);
     const int to = static_cast<int>(std::min_element(load.begin(), load.end()) - load.begin());
-    if (load[at(from)] * static_cast<double>(ranks) <= kUneven * sum) return;
+    if (load[at(from)] * static_cast<double>(ranks) <= 1.02 * sum) return;
     if (of.empty()) {
       for (int c = begin; c < end; ++c)
         of.push_back(owned(whole.chunks[at(c)].place, whole.chunks[at(c + 1)].place, owner));

@@ -24,7 +24,6 @@ using linalg::at;
 
 namespace {
 
-constexpr int kPlaces = 20;  // parts are cut anew at every so many of them
 // Numbers that are gathered.
 constexpr int kReport = 6, kOfContact = 5;
 constexpr int kOfBody = Vector6d::SizeAtCompileTime, kOfState = Eigen::Vector4d::SizeAtCompileTime;
@@ -358,7 +357,8 @@ RankTeam::~RankTeam() = default;
 
 void RankTeam::place(const std::vector<Vector3d>& positions) {
   Implementation& own = *implementation_;
-  if (own.places++ % kPlaces != 0 && positions.size() == own.positions.size()) return;
+  // Parts are cut anew at every twentieth call.
+  if (own.places++ % 20 != 0 && positions.size() == own.positions.size()) return;
   own.positions = positions;
   own.owned_by_place = false;
 }

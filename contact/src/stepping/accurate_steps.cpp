@@ -13,14 +13,10 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSafety = 0.8;     // of the wanted accuracy
-constexpr double kShortest = 1e-9;  // of a step: sub-steps that are accepted as they are
-constexpr double kAtOnce = 0.1;     // of the accuracy: what an impact may come too early
+constexpr double kAtOnce = 0.1;  // of the accuracy: what an impact may come too early
 constexpr int kManyImpacts =
     1000;  // in a step: from then on they end it in as many sub-steps at most
 constexpr double kSlips = 1 - 1e-6;  // of the cone
-constexpr double kStill = 0.01;      // of the accuracy: a slip that moves nothing in a sub-step
-constexpr double kBeforeEnd = 0.95;  // of a sub-step: a switch that ends it
 
 Vector3d rotation_between(const linalg::Quaternion& from, const linalg::Quaternion& to) {
   linalg::Quaternion d = to * from.conjugate();
@@ -87,7 +83,7 @@ void AccurateSteps::list_active(double length, std::vector<Active>& list) const 
     a.came = slip_of(before_.motion, c);
     a.speed = slip_of(stepper_.bodies.motion, c).norm();
   }
-  if (stepper_.rolling) list_moments(list);
+  if (stepper_.cones.near != nullptr) list_moments(list);
   for (const Impact& i : stepper_.impacts->list())
     if (moment(i, length).early < length)
       list.push_back(
@@ -195,7 +191,7 @@ double AccurateSteps::first_switch(double length) const {
     const Active* past = find(past_, a.id);
     // Friction stops what slips, or has turned against what it did at the start.
     const double came = a.came.norm();
-    if (came * length > kStill * stepper_.options.accuracy * a.size &&
+    if (came * length > 0.01 * stepper_.options.accuracy * a.size &&
         (a.behaviour == Behaviour::sticks || a.slip.dot(a.came) > 0)) {
       const double way = 2 * past_length_;
       first = std::min(first, past != nullptr && past->behaviour == Behaviour::slips
@@ -234,7 +230,8 @@ double AccurateSteps::error(double length, bool smooth) const {
     most = std::max({most, length * (now.velocity - was.velocity).norm() / R,
                      length * (now.angular_velocity - was.angular_velocity).norm()});
   }
-  return most / (kSafety * stepper_.options.accuracy);
+  // 0.8: on the safe side of the wanted accuracy.
+  return most / (0.8 * stepper_.options.accuracy);
 }
 
 // 2 halves - whole. A body that no moment acts on keeps its momentum exactly, and its halves.
@@ -331,7 +328,7 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
     const bool smooth = take_halves(time, length);
     const double off = std::max(error(length, smooth), 1e-4);
     const double when = smooth || switched ? length : first_switch(length);
-    if (when > shortest && when < kBeforeEnd * length && off > 0.05) {
+    if (when > shortest && when < 0.95 * length && off > 0.05) {
       back();
       length = when;
       cut = switched = true;
@@ -353,8 +350,8 @@ double AccurateSteps::take_sub_step(double time, double length, bool shortened, 
 }
 
 void AccurateSteps::take(double start, double length) {
-  double done = 0, shortest = kShortest * length;
-  past_.clear();  // a run that goes on from a saved state has none
+  double done = 0, shortest = 1e-9 * length;  // accepted as they are
+  past_.clear();                              // a run that goes on from a saved state has none
   for (int taken_parts = 0; done < length; ++taken_parts) {
     if (taken_parts == kManyImpacts) shortest = length / kManyImpacts;
     const double left = length - done, least = std::min(shortest, left);

@@ -25,12 +25,12 @@ void shift(BodySet& bodies, int body, double dt, const Vector3d& v, const Vector
 
 }  // namespace
 
-PositionCorrection::PositionCorrection(const SteppingOptions& options, IslandMaker* maker)
+PositionCorrection::PositionCorrection(const SteppingOptions& options, ConeSources& sources)
     : error_reduction_(options.error_reduction),
       max_speed_(options.max_depenetration_speed),
-      islands_(maker),
-      closing_solver_(closing_options(options), maker, LawUse::closing),
-      solver_(correction_options(options), maker, LawUse::limits) {}
+      islands_(sources.links),
+      closing_solver_(closing_options(options), sources, LawUse::closing),
+      solver_(correction_options(options), sources, LawUse::limits) {}
 
 // Largest speed at which a contact may close; negative: least speed at which it has to open.
 double PositionCorrection::bias(double gap, double dt) const {

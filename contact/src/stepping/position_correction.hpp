@@ -4,15 +4,16 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
+#include "joints/cone_islands.hpp"
 #include "stepping/impacts/impacts.hpp"
-#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 
 /// Closes the gaps that inelastic impacts leave, and takes penetrations back (method, section 7).
 class PositionCorrection {
  public:
-  PositionCorrection(const SteppingOptions& options, IslandMaker* maker);
+  PositionCorrection(const SteppingOptions& options, ConeSources& sources);
 
   /// Called after the solve of velocities. An impact without restitution stops the approach at once
   /// and would leave its gap open. The positions of its island move as if the approach ended at the

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "joints/stepping/step_joints.hpp"
+
 #include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
@@ -15,10 +17,7 @@ using linalg::at;
 
 namespace {
 
-constexpr double kWhile = 5;       // times sqrt(size / g)
-constexpr double kSame = 1e-9;     // of the forces: changes that wake
 constexpr double kAtFirst = 1e-3;  // the same where a body has just come to rest, of its weight
-constexpr double kStays = 1e-8;    // of its size: what rounding may move a neighbour
 
 }  // namespace
 
@@ -33,7 +32,7 @@ Sleeping::Sleeping(const BodySet& bodies, std::vector<double> sizes, double spee
   place_.resize(n);
 }
 
-void Sleeping::set_joints(const JointPart& joints) {
+void Sleeping::set_joints(const StepJoints& joints) {
   for (std::size_t i = 0; i < may_.size(); ++i) {
     held_[i] = joints.holds(static_cast<int>(i));
     may_[i] = may_[i] != 0 && held_[i] == 0;
@@ -76,7 +75,7 @@ bool Sleeping::has_changed(int body, const Vector3d& a, const Vector3d& turn, co
       bodies.orientation[at(body)].coeffs() != place.orientation.coeffs())
     return true;
   const double most =
-      rest.fresh ? kAtFirst * gravity_ : kSame * (gravity_ + rest.acceleration.norm());
+      rest.fresh ? kAtFirst * gravity_ : 1e-9 * (gravity_ + rest.acceleration.norm());
   return !((a - rest.acceleration).norm() +
                size_[at(body)] * (turn - rest.angular_acceleration).norm() <=
            most);
@@ -94,7 +93,7 @@ bool Sleeping::has_moved(const StepperMemory::Neighbour& n, const BodySet& bodie
   if (fixed)
     return way > 0 || speed > 0 || now.angular_velocity != n.angular_velocity ||
            bodies.orientation[i].coeffs() != n.orientation.coeffs();
-  return !(way <= kStays * size) || !(speed <= kAtFirst * speed_ * std::sqrt(size));
+  return !(way <= 1e-8 * size) || !(speed <= kAtFirst * speed_ * std::sqrt(size));
 }
 
 void Sleeping::hold(const std::vector<RigidBody>& coming, double dt, BodySet& bodies) {
@@ -178,7 +177,7 @@ void Sleeping::end(double dt, BodySet& bodies, StepContacts& contacts) const {
 }
 
 bool Sleeping::has_rested(int body) const {
-  return body_[at(body)].slow >= kWhile * std::sqrt(size_[at(body)] / gravity_);
+  return body_[at(body)].slow >= 5 * std::sqrt(size_[at(body)] / gravity_);
 }
 
 void Sleeping::fall_asleep(double dt, BodySet& bodies, const StepContacts& contacts) {

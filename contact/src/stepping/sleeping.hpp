@@ -9,9 +9,11 @@
 
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
-#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
+
+class StepJoints;
 
 /// method, section 7. Islands of bodies that press on each other fall asleep when all of them have
 /// been slow for a while: they stay where they are, take part in no problem, and their contacts
@@ -23,7 +25,7 @@ class Sleeping {
  public:
   /// `sizes`: of bodies, m. `speed`: m/s for a size of 1 m; goes with its root.
   Sleeping(const BodySet& bodies, std::vector<double> sizes, double speed, double gravity);
-  void set_joints(const JointPart& joints);
+  void set_joints(const StepJoints& joints);
 
   int count() const { return count_; }
   const std::vector<char>& asleep() const { return asleep_; }  ///< of each body

@@ -3,18 +3,11 @@
 
 namespace tether::contact::detail {
 
-namespace {
-
 // The vibration w^2 of loads on joints grows with the mass ratio of load and link, and with the
-// shock of a slack chain that snaps taut. Each halving allows four times as much; the last four
-// resolve how w changes, to w dt of a tenth.
-constexpr int kJointHalvings = 24;
-
-}  // namespace
-
+// shock of a slack chain that snaps taut. Each of 24 halvings allows four times as much; the last
+// four resolve how w changes, to w dt of a tenth.
 SubStep StepHalving::whole(double start, double length) const {
-  return {start, length, stepper_.options.max_halvings, kJointHalvings,
-          stepper_.cuts ? StepCuts::kMost : 0};
+  return {start, length, stepper_.options.max_halvings, 24, stepper_.cuts ? StepCuts::kMost : 0};
 }
 
 int StepHalving::advance(SubStep s) {

@@ -48,7 +48,7 @@ void Stepper::Implementation::step() {
     halving.advance(halving.whole(start, length));
   }
   if (!steps.is_finite()) {
-    steps.tally.succeeded = false;
+    steps.tally.worsen(detail::Outcome::unsolved);
     steps.tally.status = Status::unsolved;
   }
   late = 0;
@@ -95,8 +95,12 @@ const std::vector<Eigen::Vector3d>& Stepper::contact_moments() const {
 double Stepper::penetration() const { return implementation_->steps.tally.deepest; }
 double Stepper::residual() const { return implementation_->steps.tally.residual; }
 Status Stepper::status() const { return implementation_->steps.tally.status; }
-bool Stepper::succeeded() const { return implementation_->steps.tally.succeeded; }
-bool Stepper::joints_met() const { return implementation_->steps.tally.joints_met; }
+bool Stepper::succeeded() const {
+  return implementation_->steps.tally.outcome == detail::Outcome::met;
+}
+bool Stepper::joints_met() const {
+  return implementation_->steps.tally.outcome != detail::Outcome::joints_unmet;
+}
 double Stepper::joint_drift() const {
   const auto& joints = implementation_->steps.joints;
   return joints ? joints->drift : 0;

@@ -1,6 +1,7 @@
 // Tether: what sub-steps of a step are, and what they change. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <tether/contact/stepping.hpp>
 #include <tether/linalg/index.hpp>
@@ -35,11 +36,16 @@ struct SubStep {
 /// unsolved, joints unmet, an impact to cut at, a body woken.
 enum class SubStepEnd : std::uint8_t { whole, unsolved, unmet, cut, woken };
 
-/// Outcome of the contact problems of a step: the worst of its sub-steps, and counts. Restored when
-/// the same sub-step is taken again.
+/// How a step has gone, from the best to the worst: all met, a contact problem above what is
+/// accepted, joints unmet at its end.
+enum class Outcome : std::uint8_t { met, unsolved, joints_unmet };
+
+/// Outcome of a step: the worst of its sub-steps, and counts of their contact problems. Restored
+/// when the same sub-step is taken again.
 struct Tally {
   Status status = Status::solved;
-  bool succeeded = true, joints_met = true;
+  Outcome outcome = Outcome::met;
+  void worsen(Outcome by) { outcome = std::max(outcome, by); }
   double residual = 0, deepest = 0;
   long bounces = 0, accepted = 0, unsolved = 0;
 };

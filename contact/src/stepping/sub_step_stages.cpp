@@ -4,21 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "joints/cone_islands.hpp"
 #include "stepping/sub_stepper.hpp"
 
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
 using linalg::at;
-
-namespace {
-
-// Rounding of gaps in many steps, in parts of the positions.
-constexpr double kClosed = 1e3 * std::numeric_limits<double>::epsilon();
-constexpr int kMostRounds = 50;  // of bounds that follow impulses, which contract
-
-}  // namespace
 
 void SubStepper::leave_out_joined() {
   if (!joints) return;
@@ -61,14 +52,15 @@ void SubStepper::find_contacts() {
 
 // Gaps of the size of rounding count as closed. They differ from contact to contact, and bodies on
 // more contacts than they need cannot close all of them: with gap / dt, rounding would decide which
-// contacts carry the load.
+// contacts carry the load. In many steps rounding grows to 1e3 units of the positions.
 void SubStepper::set_gaps() {
   for (std::size_t k = 0; k < contacts.gaps.size(); ++k) {
     const double gap = contacts.gaps[k];
     tally.deepest = std::max(tally.deepest, -gap);
     PointContact& c = contacts.points[k];
     const double size = c.r1.lpNorm<1>() + bodies.position[at(c.first)].lpNorm<1>();
-    const double open = std::min(gap, 2 * (gap - kClosed * size));
+    const double rounding = 1e3 * std::numeric_limits<double>::epsilon() * size;
+    const double open = std::min(gap, 2 * (gap - rounding));
     c.bias = open > 0 ? open / now.length : 0;
   }
 }
@@ -114,8 +106,8 @@ void SubStepper::solve_problem() {
     counts.sweeps += solution.sweeps;
     counts.assembled_islands += solution.assembled_islands;
     const bool slips = holds && lets_slip();
-    const bool changed =
-        acting_joints && round < kMostRounds && acting_joints->change_bounds(now.length);
+    // Bounds that follow impulses contract.
+    const bool changed = acting_joints && round < 50 && acting_joints->change_bounds(now.length);
     if (!slips && !changed) return;
     solver->take_back();
   }
@@ -163,7 +155,6 @@ void SubStepper::solve_contacts() {
   contacts.impulses.resize(contacts.points.size());  // assign() would grow without reserve
   std::fill(contacts.impulses.begin(), contacts.impulses.end(), Vector3d::Zero());
   contacts.moments.clear();
-  failed = false;
   const bool laws = acting_joints && joints->has_laws();
   const bool of_cut = now.side != SubStep::Side::none;
   if ((contacts.points.empty() && !laws) || (of_cut && !laws && nothing_presses())) {
@@ -185,8 +176,7 @@ void SubStepper::solve_contacts() {
   if (end != SubStepEnd::whole) return;
   take_velocities(solution, bodies);
   std::copy(solution.impulses.begin(), solution.impulses.end(), contacts.impulses.begin());
-  if (rolling && near->any_rolling())
-    contacts.moments = joints ? joints->moments : rolling->moments;
+  if (near && near->any_rolling()) contacts.moments = cones.moments;
 }
 
 // Whether a shorter sub-step would not help: none is allowed, or there is an impact, whose impulse
@@ -200,7 +190,7 @@ void SubStepper::judge() {
   const bool solved = solution.status == Status::solved;
   const double last = options.acceptance > 1 ? kLast : kGood;
   const double most = std::max(accepted_residual(options), shortest() ? last : 0.0);
-  failed = !solved && !(solution.error <= most);
+  const bool failed = !solved && !(solution.error <= most);
   if (failed && now.halvings > 0) {
     end = SubStepEnd::unsolved;
     return;
@@ -208,7 +198,7 @@ void SubStepper::judge() {
   tally.accepted += !solved && !failed;
   tally.unsolved += failed;
   if (!solved) tally.status = solution.status;
-  tally.succeeded = tally.succeeded && !failed;
+  if (failed) tally.worsen(Outcome::unsolved);
   if (!(solution.error <= tally.residual)) tally.residual = solution.error;
 }
 
@@ -216,7 +206,7 @@ void SubStepper::judge() {
 // with them are added and the problem is solved again, three times at most; the next step finds the
 // rest.
 void SubStepper::meet_others() {
-  for (int again = 0; again < 3 && !failed; ++again) {
+  for (int again = 0; again < 3 && !failed(); ++again) {
     const std::size_t before = contacts.points.size();
     if (!near->find_more(bodies, now.length, contacts)) return;
     leave_out_joined();
@@ -247,7 +237,7 @@ void SubStepper::hold_sleepers() {
 }
 
 void SubStepper::end_sleep() {
-  if (!failed && now.side == SubStep::Side::none)
+  if (!failed() && now.side == SubStep::Side::none)
     sleeping->fall_asleep(now.length, bodies, contacts);
   sleeping->end(now.length, bodies, contacts);
 }
@@ -264,7 +254,7 @@ void SubStepper::predict_joints() {
 
 void SubStepper::move_joints() {
   if (!acting_joints || joints->move(bodies, now.start, now.length, contacts)) return;
-  tally.succeeded = tally.joints_met = false;
+  tally.worsen(Outcome::joints_unmet);
 }
 
 }  // namespace tether::contact::detail

@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "joints/cone_islands.hpp"
 #include "stepping/detection/collide.hpp"
 
 namespace tether::contact::detail {
@@ -78,26 +77,21 @@ void SubStepper::make_solvers() {
   const double bounce = threshold_speed(options.restitution_threshold, options);
   const bool laws = joints && joints->has_laws(),
              bounces = near && near->any([](const Meeting&m) { return m.restitution > 0; });
-  if (near && (near->any_rolling() || near->any_elliptic()))
-    rolling = std::make_unique<RollingPart>(*near);
-  if (joints && rolling) joints->set_rolling(*near);
-  IslandMaker* maker = rolling.get();
-  if (joints) maker = joints.get();
+  if (near && (near->any_rolling() || near->any_elliptic())) cones.hold_moments(*near);
   const auto new_restitution = [&](LawUse use) {
-    return std::make_unique<Restitution>(options.restitution_law, o, maker, use);
+    return std::make_unique<Restitution>(options.restitution_law, o, cones, use);
   };
-  solver = std::make_unique<StepSolver>(o, maker, LawUse::all);
+  solver = std::make_unique<StepSolver>(o, cones, LawUse::all);
   if (!impacts) impacts = std::make_unique<Impacts>(impact, bounce);
   if (bounces || laws) restitution = new_restitution(LawUse::plastic);
-  if (laws) restitution->set_laws(*joints);
   if (!near) return;
   if (options.cut_at_impacts && !(options.accuracy > 0))
-    cuts = std::make_unique<StepCuts>(o, maker);
+    cuts = std::make_unique<StepCuts>(o, cones);
   if (bounces && cuts) bounces_at_once = new_restitution(LawUse::none);
   if (options.error_reduction > 0 && options.max_depenetration_speed > 0)
-    positions = std::make_unique<PositionCorrection>(options, maker);
+    positions = std::make_unique<PositionCorrection>(options, cones);
   if (laws && cuts && options.simultaneous_impacts == SimultaneousImpacts::together)
-    cuts->set_laws(*joints);
+    cuts->leave_whole(cones.under_laws);
 }
 
 void SubStepper::add_force(const char* effect, Force force) {
@@ -106,7 +100,7 @@ void SubStepper::add_force(const char* effect, Force force) {
       {effect, [this, force = std::move(force)] { force(bodies, now.start, now.length); }});
 }
 
-void SubStepper::add_joints(std::unique_ptr<JointPart> part) {
+void SubStepper::add_joints(std::unique_ptr<StepJoints> part) {
   joints = std::move(part);
   if (!impacts)
     impacts = std::make_unique<Impacts>(threshold_speed(options.impact_threshold, options),
@@ -215,7 +209,6 @@ void SubStepper::set_now(const SubStep& s) {
 SubStepEnd SubStepper::take() {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start = Clock::now();
-  failed = false;
   end = SubStepEnd::whole;
   for (Stage& stage : stages) {
     stage.run();

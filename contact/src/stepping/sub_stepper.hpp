@@ -6,12 +6,12 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
+#include "joints/stepping/step_joints.hpp"
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
 #include "stepping/impacts/restitution.hpp"
 #include "stepping/impacts/step_cuts.hpp"
 #include "stepping/motion/free_motion.hpp"
-#include "stepping/motion/joint_part.hpp"
 #include "stepping/motion/mid_step.hpp"
 #include "stepping/position_correction.hpp"
 #include "stepping/sleeping.hpp"
@@ -19,8 +19,6 @@
 #include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
-
-class RollingPart;
 
 /// Takes one sub-step: a list of stages, made once from the options and the bodies. StepHalving,
 /// StepCutting and AccurateSteps decide about shorter sub-steps.
@@ -38,7 +36,7 @@ struct SubStepper {
   ~SubStepper();
   void add_force(const char* effect, Force force);
   /// Before forces.
-  void add_joints(std::unique_ptr<JointPart> part);
+  void add_joints(std::unique_ptr<StepJoints> part);
   /// Calls it between the stages.
   void observe(StepObserver observer);
   /// New solvers, without warm starts.
@@ -68,6 +66,7 @@ struct SubStepper {
   std::size_t first_force = 0, forces = 0;  // the first stage of a force, and how many there are
   FreeMotion motion;
 
+  ConeSources cones;
   // Only with meetings; impacts also with joints, the solver with laws of these.
   std::unique_ptr<NearContacts> near;
   std::unique_ptr<StepSolver> solver;
@@ -82,18 +81,19 @@ struct SubStepper {
   MidStep mid_step;
   std::vector<PointContact> turned;  // contacts as of the middle of the step
   BodySolution solution;
-  std::unique_ptr<JointPart> joints;     // only where they have been added
-  JointPart* acting_joints = nullptr;    // the same where bodies that they hold take part
-  std::unique_ptr<RollingPart> rolling;  // only where a meeting names it, or elliptic friction
+  std::unique_ptr<StepJoints> joints;   // only where they have been added
+  StepJoints* acting_joints = nullptr;  // the same where bodies that they hold take part
 
   SubStep now;
   SubStepEnd end = SubStepEnd::whole;
-  bool failed = false;                 // its problem, though it may be used
   bool unmeetable = false;             // joints, in this step: however short the sub-step
   bool met = false;                    // islands that were apart, in this step
   Tally tally, tally_before;           // the latter: before the problem of the sub-step,
   std::vector<RigidBody> free_motion;  // and what bodies would do without
   StepCounts counts;                   // but for those of `tally`
+
+  /// Whether its contact problem is above what is accepted, though it is used.
+  bool failed() const { return tally.unsolved > tally_before.unsolved; }
 
  private:
   /// Adds a stage that calls run(*this).

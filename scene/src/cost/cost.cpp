@@ -125,8 +125,7 @@ CostRow measure_row(const Scene& scene, Setting setting, const std::vector<doubl
   row.steps = r.counts.steps;
   row.contact_problems = r.counts.contact_problems;
   row.seconds = r.seconds;
-  row.met = static_cast<int>(
-      count_if(r.judgements, [](const Judgement& j) { return j.judged && j.met; }));
+  row.met = static_cast<int>(r.count(Verdict::met));
   // Without the records in between; the least of several: everything else on the machine only adds.
   double spent = 0;
   for (int repeat = 0; repeat < 5 && spent < 0.3 && row.failure.empty(); ++repeat) {

@@ -13,20 +13,16 @@ namespace tether::scene::costs {
 
 namespace {
 
-// Comparisons are for what ends soon: more than these are a storm.
-constexpr int kMostEventSteps = 1000000;
-
 Eigen::Quaterniond turned(const Eigen::Vector3d& by, const Eigen::Quaterniond& q) {
   const double angle = by.norm();
   if (!(angle > 0)) return q;
   return Eigen::AngleAxisd(angle, by / angle) * q;
 }
 
-constexpr int kReferenceSteps = 20000;  // between two stops; then it is given up
-
 Scene projected(const Scene& scene, double tolerance) {
   Scene out = with_setting(scene, CostMethod::smooth, tolerance);
-  out.smooth->max_steps = std::min(out.smooth->max_steps, kReferenceSteps);
+  // Between two stops; then it is given up.
+  out.smooth->max_steps = std::min(out.smooth->max_steps, 20000);
   return out;
 }
 
@@ -51,9 +47,8 @@ std::optional<Reference> tightest(Scene (*make)(const Scene&, double), const Sce
                                   const char* name, double tolerance, const Times& times,
                                   const CostOptions& options) {
   // Each ten times as loose; a mechanism at a singular position may get through from 1e-8 on only.
-  constexpr int kTries = 8;
   std::optional<Reference> best;
-  for (int k = 0; k < kTries && tolerance < 0.1; ++k, tolerance *= 10) {
+  for (int k = 0; k < 8 && tolerance < 0.1; ++k, tolerance *= 10) {
     const Measured m = measure_once(make(scene, tolerance), times.all, options);
     if (!m.result.failure.empty()) continue;
     if (best) {
@@ -170,7 +165,7 @@ Scene with_setting(const Scene& scene, CostMethod method, double setting) {
     out.event->otherwise = Otherwise::stop;
     out.event->tolerance = setting;
     out.event->max_events = std::min(out.event->max_events, kMostPoses);
-    out.event->max_steps = std::min(out.event->max_steps, kMostEventSteps);
+    out.event->max_steps = std::min(out.event->max_steps, 1000000);  // more are a storm
     return out;
   }
   out.stepping = scene.stepping.value_or(SteppingOptions{});

@@ -12,7 +12,6 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kLeastLocal = 1e-13, kLeastInFlight = 2e-13;  // of IDA: more is rounding
-constexpr double kTight = 1e-11;
 
 // Method, eq. 12: IDA bounds the error of a step. What it adds up to over tens of events, and tens
 // of periods between them, is to be within ten tolerances (a mass that rubs to rest in thirteen
@@ -32,15 +31,14 @@ double part_of_tolerance(double tolerance, double part) {
 
 // From a bounce on: an error of the height is one of the time of the next impact, over its speed.
 double flight_tolerance(double tolerance, double speed) {
-  const bool tight = wanted_tolerance(tolerance) < kTight;
+  const bool tight = wanted_tolerance(tolerance) < 1e-11;
   return tight ? part_of_tolerance(tolerance, speed) : kInfinity;
 }
 
 // To an impact with this speed that does not end a bounce. Errors of gaps are those of its time,
 // over the speed; what the phase before has left is a part of the tolerance.
 double graze_tolerance(double tolerance, double speed) {
-  constexpr double kSlow = 0.04;
-  return part_of_tolerance(tolerance, speed / kSlow);
+  return part_of_tolerance(tolerance, speed / 0.04);
 }
 
 constexpr long kMostAtOneTime = 300;
@@ -48,15 +46,12 @@ constexpr long kMostAtOneTime = 300;
 // thousand years.
 constexpr long kManySteps = 100000;
 constexpr double kNoWay = 1e-12;
-constexpr long kFewEvents = 100;
-constexpr double kMostStorms = 25;  // as much work again for the rest of the run
 
 using linalg::at;
 
 // The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
 // T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
 constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
-constexpr double kAtGaps = 0.01;  // of their bands: gaps that are no rounding
 
 /// Until a gap that falls with the acceleration `back` is zero, s; 0: never.
 double flight_time(double gap, double rate, double back) {
@@ -279,7 +274,8 @@ void Driver::check_storm() {
   if (!(options_.end > 0) || work - storm_.work < options_.storm) return;
   const double way = start_.time - storm_.time, left = options_.end - start_.time;
   const long events = counts_.events - storm_.events;
-  if (events >= kFewEvents && way * kMostStorms < left)
+  // As much work again for the rest of the run, 25 times.
+  if (events >= 100 && way * 25 < left)
     fail(fmt::format("a storm of events: the last {} took {:.3g} s together, and {:.3g} s are left",
                      events, way * model_.time_unit(), left * model_.time_unit()));
   storm_ = {work, start_.time, counts_.events};
@@ -428,7 +424,8 @@ std::string Driver::contradiction() const {
   const double unit = model_.length_unit();
   std::string text = "the state cannot be moved onto joints and closed contacts";
   // Both sides of a clearance, say.
-  if (gap > kAtGaps * band)
+  // Gaps that are no rounding.
+  if (gap > 0.01 * band)
     text += fmt::format(
         ": at this tolerance gaps of up to {:.3g} m count as closed, and of the {} contacts that "
         "do so "

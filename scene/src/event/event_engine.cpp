@@ -341,7 +341,7 @@ VectorXd EventEngine::coordinates_of(const std::vector<BodyState>& bodies) const
 // Contacts that a step has closed fall and are stopped by as much as the accelerations make of it.
 StartState EventEngine::exactness_of(SceneModel& model, const SteppedState& state,
                                      const VectorXd& y) const {
-  constexpr double kSteps = 4, kLeast = 1e-6;
+  constexpr double kLeast = 1e-6;
   model.set(state.time / units_.time, y.data(), y.data() + model.coordinates());
   VectorXd a;
   model.forces(a);
@@ -351,7 +351,7 @@ StartState EventEngine::exactness_of(SceneModel& model, const SteppedState& stat
     fastest = std::max(fastest, a.segment<3>(6 * k).norm());
   const double step = state.step / units_.time;
   StartState out;
-  out.speed = kSteps * fastest * step + kLeast;
+  out.speed = 4 * fastest * step + kLeast;
   out.gap = out.speed * step + kLeast;
   return out;
 }

@@ -137,7 +137,7 @@ class EventsThenSteps final : public Engine {
 };
 
 void EventsThenSteps::advance(double t) {
-  const double slack = kSameBoundary * step_;
+  const double slack = kSameFigure * step_;
   while (true) {
     if (!steps_) try {
         events_->advance(t);

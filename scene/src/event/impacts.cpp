@@ -24,10 +24,7 @@ constexpr double kLeastHeight = 5e-12;  // of a flight, of the largest coordinat
 
 using linalg::at;
 
-constexpr int kMostRounds = 2000;    // of one instant
-constexpr double kUnknownGap = 0.1;  // of its band
-
-constexpr double kLeastApproach = 1e-12;  // of the slip
+constexpr int kMostRounds = 2000;  // of one instant
 
 }  // namespace
 
@@ -92,8 +89,8 @@ std::vector<int> Driver::struck(const std::vector<int>& near, int first) {
     double rate = 0;
     const double gap = model_.gap(i, rate), band = bands().approach(i);
     // Which of two corners is first may be a matter of the error of their gaps. What bounces
-    // before its time would miss the way to there.
-    const double unknown = model_.law(i).restitution > 0 ? 0 : kUnknownGap * bands().gap(i);
+    // before its time would miss the way to there. Gaps are known to a tenth of their band.
+    const double unknown = model_.law(i).restitution > 0 ? 0 : 0.1 * bands().gap(i);
     const bool open = motion_.modes()[at(i)].mode == Mode::open;
     const bool now = i == first || !open || gap <= std::max(-rate * options_.tolerance, unknown);
     const bool passes = open && i != first && motion_.passes_border(start_.time, start_.y, i);
@@ -328,7 +325,7 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities) {
   FrictionProblem problem = rows.problem(-velocities);
   for (ConePart& p : problem.parts) {
     p.bound = 0;  // no impulse
-    if (p.has_normal()) problem.b[p.first] = kLeastApproach * velocities.cwiseAbs().maxCoeff();
+    if (p.has_normal()) problem.b[p.first] = 1e-12 * velocities.cwiseAbs().maxCoeff();
   }
   ++counts_.contact_problems;
   const FrictionSolution answer = solve_friction(problem);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <tether/scene/plan.hpp>
 
+#include "bounds.hpp"
 #include "parts.hpp"
 #include "toml/report.hpp"
 
@@ -13,7 +14,6 @@ namespace tether::scene::import {
 
 namespace {
 
-constexpr double kNear = 1e-9;  // m: lines this near to each other meet
 constexpr std::size_t kMostMaterials = 32;
 
 using Chain = std::vector<PlacedJoint>;
@@ -25,12 +25,13 @@ std::optional<Vector3d> crossing(const PlacedJoint& a, const PlacedJoint& b) {
   if (square < 1e-12) return {};
   const Vector3d on_a = a.at + d.cross(b.axis).dot(across) / square * a.axis;
   const Vector3d on_b = b.at + d.cross(a.axis).dot(across) / square * b.axis;
-  if (!((on_a - on_b).norm() <= kNear * (1 + d.norm()))) return {};
+  if (!((on_a - on_b).norm() <= kSameFigure * (1 + d.norm()))) return {};
   return (on_a + on_b) / 2;
 }
 
 bool passes(const PlacedJoint& joint, const Vector3d& point) {
-  return (point - joint.at).cross(joint.axis).norm() <= kNear * (1 + (point - joint.at).norm());
+  return (point - joint.at).cross(joint.axis).norm() <=
+         kSameFigure * (1 + (point - joint.at).norm());
 }
 
 bool are_right(const Vector3d& u, const Vector3d& v) { return std::abs(u.dot(v)) <= 1e-9; }
@@ -67,10 +68,21 @@ std::optional<Joint> as_one(const Chain& chain) {
   return out;
 }
 
-/// Whether something acts along the coordinate of a joint, which it needs for that.
+/// Joints in a kept sum, or driven by what exerts something.
+std::set<std::string> with_common_laws(const Model& model, const ImportOptions& options) {
+  std::set<std::string> out;
+  for (const Drive& drive : model.drives)
+    for (const Transmission& to : drive.to)
+      if (!law_of(drive, options).isZero(0)) out.insert(to.joint);
+  for (const KeptSum& sum : model.kept_sums)
+    for (const Transmission& term : sum.terms) out.insert(term.joint);
+  return out;
+}
+
+/// Whether something of its own acts along the coordinate of a joint, which it needs for that.
 bool has_laws(const LinkJoint& law, const ImportOptions& options) {
-  return law.has_common_law || law.damping > 0 || law.stiffness > 0 || law.armature > 0 ||
-         law.mimic || (options.joint_laws && (law.limits || law.friction > 0));
+  return law.damping > 0 || law.stiffness > 0 || law.armature > 0 || law.mimic ||
+         (options.joint_laws && (law.limits || law.friction > 0));
 }
 
 std::string clean_title(const std::string& name) {
@@ -101,7 +113,11 @@ class Drafting {
  public:
   Drafting(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
            Remarks& remarks)
-      : model_(model), parts_(parts), options_(options), remarks_(remarks) {}
+      : model_(model),
+        parts_(parts),
+        options_(options),
+        remarks_(remarks),
+        common_(with_common_laws(model, options)) {}
 
   Draft take() {
     scene_.name = clean_title(model_.name);
@@ -160,6 +176,7 @@ class Drafting {
   const std::vector<Part>& parts_;
   const ImportOptions& options_;
   Remarks& remarks_;
+  const std::set<std::string> common_;
   Draft draft_;
   Scene& scene_ = draft_.scene;
   std::vector<int> body_of_;  // of each part
@@ -266,7 +283,9 @@ void Drafting::add_joints(const Part& part, int body, int on) {
     return;
   }
   if (chain.size() == 1) return add_joint(chain[0], body, on);
-  const bool plain = !any_of(chain, [&](const PlacedJoint& j) { return has_laws(j, options_); });
+  const bool plain = !any_of(chain, [&](const PlacedJoint& j) {
+    return common_.count(j.name) > 0 || has_laws(j, options_);
+  });
   if (std::optional<Joint> one = plain ? as_one(chain) : std::nullopt) {
     for (const PlacedJoint& each : chain) one->name += (one->name.empty() ? "" : " + ") + each.name;
     one->first = body;

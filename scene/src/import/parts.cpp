@@ -273,18 +273,6 @@ void check_part(Part& part, bool mend, Remarks& remarks, Problems& problems) {
           "; --mend takes the nearest ones");
 }
 
-/// Marks the joints that need a coordinate for what acts on several.
-void find_common_laws(Model& model, const ImportOptions& options) {
-  std::set<std::string> common;
-  for (const Drive& drive : model.drives)
-    for (const Transmission& to : drive.to)
-      if (!law_of(drive, options).isZero(0)) common.insert(to.joint);
-  for (const KeptSum& sum : model.kept_sums)
-    for (const Transmission& term : sum.terms) common.insert(term.joint);
-  for (Link& link : model.links)
-    for (LinkJoint& joint : link.joints) joint.has_common_law = common.count(joint.name) > 0;
-}
-
 std::vector<LinkStart> starts_of(Model& model, const ImportOptions& options) {
   const std::map<std::string, const LinkJoint*> all = joints_of(model);
   std::vector<LinkStart> out;
@@ -364,7 +352,6 @@ bool has_wide_limits(const LinkJoint& joint) {
 std::vector<Part> make_parts(Model& model, const ImportOptions& options, Problems& problems) {
   if (options.density) weigh_shapes(model, *options.density);
   check_names(model, options);
-  find_common_laws(model, options);
   std::vector<Part> parts = welded(model, starts_of(model, options));
   drop_round_off(parts, model.remarks);
   fold_massless(parts, model.remarks, problems);

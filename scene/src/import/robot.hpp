@@ -54,7 +54,6 @@ struct LinkJoint {
   double friction = 0;                ///< N m, N
   double stiffness = 0, damping = 0;  ///< N/m, N s/m: of slides; N m/rad, N m s: of hinges
   double armature = 0;                ///< kg m^2, kg: inertia of a rotor
-  bool has_common_law = false;        ///< in a kept sum, or driven by what exerts something
   double rest = 0;                    ///< of the stiffness
   std::optional<Mimic> mimic;
   int line = 0;

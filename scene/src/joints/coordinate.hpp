@@ -76,12 +76,11 @@ class Coordinate {
   static S angle_over_sine(const S& cosine);
 
   MotionOf what_;
-  bool fixed_direction_;  // in the axes of the second body
   int component_;
   int first_, second_;
   Vector3d at_first_, at_second_;     // in the axes of each body
   Vector3d of_first_, zero_, ahead_;  // angle: it turns of_first from zero to ahead
-  Vector3d axis_;                     // of the second body
+  std::optional<Vector3d> axis_;      // of the second body; none: along the way between the points
   Matrix3d start_;                    // component: of the second body in axes of the first
 };
 
@@ -96,7 +95,7 @@ S Coordinate::value(const Frame<S>& A, const Frame<S>& B) const {
     return S(atan2(sine, cosine));
   }
   const Vector3<S> d = span(A, B);
-  return fixed_direction_ ? S(dot(d, times(B.R, axis_))) : S(sqrt(dot(d, d)));
+  return axis_ ? S(dot(d, times(B.R, *axis_))) : S(sqrt(dot(d, d)));
 }
 
 // s = atan2(y, x), r s' = x y' - y x', r s'' = x y'' - y x'' - r' s', r = x^2 + y^2
@@ -106,7 +105,7 @@ void Coordinate::derivatives(const Frame<S>& A, const Frame<S>& B, S* s) const {
   if constexpr (order == 0) return;
   if (what_ == MotionOf::length) {
     const Jet<S> d = between<order>(A, at_first_, B, at_second_),
-                 u = mechanics::direction<order>(B, axis_);
+                 u = mechanics::direction<order>(B, *axis_);
     if constexpr (order >= 1) s[1] = product<1>(u, d);
     if constexpr (order >= 2) s[2] = product<2>(u, d);
     return;
@@ -147,7 +146,7 @@ Vector3<S> Coordinate::direction(const Frame<S>& A, const Frame<S>& B) const {
     u[component_] = S(1.0);
     return u;
   }
-  if (fixed_direction_) return times(B.R, axis_);
+  if (axis_) return times(B.R, *axis_);
   Vector3<S> d = span(A, B);
   const S square = dot(d, d);
   if (!(square > 0.0)) return d;
@@ -170,8 +169,7 @@ void Coordinate::pull(const Frame<S>& A, const Frame<S>& B, const S& force, Wren
   }
   // A slider's acts on both bodies at the point of the first.
   const Vector3<S> p = point<0>(A, at_first_).x;
-  add_opposite(A, p, B, fixed_direction_ ? p : Vector3<S>(point<0>(B, at_second_).x), u, on_first,
-               on_second);
+  add_opposite(A, p, B, axis_ ? p : Vector3<S>(point<0>(B, at_second_).x), u, on_first, on_second);
 }
 
 // The turn Q = A start B' has the vector (angle / sine) (axis of Q - Q') / 2.

@@ -22,7 +22,6 @@ using mechanics::at;
 namespace {
 
 constexpr long kMostTeeth = 1000;
-constexpr double kRatioRounding = 1e-9;  // relative
 
 struct Fraction {
   long over = 0, under = 0;  // 0: none
@@ -37,7 +36,7 @@ Fraction fraction(double ratio) {
     const long p = whole * over[0] + over[1], q = whole * under[0] + under[1];
     if (p > kMostTeeth * kMostTeeth || q > kMostTeeth) break;
     if (std::abs(static_cast<double>(p) / static_cast<double>(q) - std::abs(ratio)) <=
-        kRatioRounding * std::abs(ratio))
+        kSameFigure * std::abs(ratio))
       return {ratio < 0 ? -p : p, q};
     over[1] = std::exchange(over[0], p);
     under[1] = std::exchange(under[0], q);
@@ -153,8 +152,6 @@ struct CouplingEffect : Effect {
   }
 
  private:
-  static constexpr std::size_t kMostTerms = 16;
-
   static bool read_terms(Fields& in, Reader& r, Coupling& coupling) {
     const std::map<std::string, int> joints = index_of(r.scene.joints);
     for (const std::string& name :
@@ -165,8 +162,7 @@ struct CouplingEffect : Effect {
     if (in.has("weights")) coupling.weights = in.numbers("weights", {n}, "");
     if (const Value* list = in.find("polynomial"); list != nullptr) {
       const std::size_t terms = list->kind() == Value::Kind::array ? list->items().size() : 0;
-      coupling.polynomial =
-          in.numbers("polynomial", {std::clamp<std::size_t>(terms, 1, kMostTerms)}, "");
+      coupling.polynomial = in.numbers("polynomial", {std::clamp<std::size_t>(terms, 1, 16)}, "");
     }
     if (in.has("ratio")) coupling.polynomial = {in.number("ratio", 1, kAny, "")};
     if (in.has("ratio") + in.has("weights") + in.has("polynomial") != 1)

@@ -10,7 +10,6 @@ namespace tether::scene::joints {
 
 Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
     : what_(component < 0 ? type(joint.kind).motion() : MotionOf::angle),
-      fixed_direction_(joint.kind != JointKind::distance),
       component_(component),
       first_(bodies.index(joint.first)),
       second_(bodies.index(joint.second)),
@@ -22,7 +21,7 @@ Coordinate::Coordinate(const Joint& joint, const Bodies& bodies, int component)
   of_first_ = direction_in(A(bodies), x);
   zero_ = direction_in(B, x);
   ahead_ = direction_in(B, y);
-  axis_ = direction_in(B, z);
+  if (joint.kind != JointKind::distance) axis_ = direction_in(B, z);
   start_ = A(bodies).R.transpose() * B.R;
 }
 
@@ -37,8 +36,8 @@ double Coordinate::rest(const Bodies& bodies) const {
   if (what_ == MotionOf::angle)
     return B(bodies).W.cross(direction(bodies)).dot(A(bodies).W - B(bodies).W);
   const auto [d, d1, d2] = between<2>(A(bodies), at_first_, B(bodies), at_second_);
-  if (fixed_direction_) {
-    const Jet<double> u = mechanics::direction<2>(B(bodies), axis_);
+  if (axis_) {
+    const Jet<double> u = mechanics::direction<2>(B(bodies), *axis_);
     return d2.dot(u.x) + 2 * d1.dot(u.x1) + d.dot(u.x2);
   }
   const double length = d.norm(), along = d.dot(d1) / length;
@@ -46,8 +45,6 @@ double Coordinate::rest(const Bodies& bodies) const {
 }
 
 namespace {
-
-constexpr double kBeyond = 1e-9;  // m or rad: a start this far beyond a limit is on it
 
 bool has_laws(const Joint& joint) { return joint.limits || joint.motor || joint.friction != 0; }
 bool is_free(const Joint& joint) { return type(joint.kind).is_free() && !joint.motion; }
@@ -77,7 +74,7 @@ JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
                                   "motion drives");
     for (Coordinate& each : coordinates_of(joint, j, bodies))
       joints_.push_back({static_cast<int>(j), joint, std::move(each)});
-    if (joint.limits && (joint.limits->lower > kBeyond || joint.limits->upper < -kBeyond))
+    if (joint.limits && (joint.limits->lower > kSameFigure || joint.limits->upper < -kSameFigure))
       throw std::invalid_argument(name + "it is at 0 at t = 0, which must be between its limits");
   }
   for (std::size_t i = 0; i < scene.springs.size(); ++i)
@@ -148,13 +145,12 @@ bool JointLaws::shares_tension(int law) const {
 
 bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
                               contact::JointLaws& laws) const {
-  constexpr double kSame = 1e-9;  // of a bound
   const int first = count() - static_cast<int>(slips_.size());
   double change = 0, largest = 0;
   const auto force = [&](std::size_t ring) {
     const double x = impulses[at(first) + ring] / dt;
     const double bound = laws[first + static_cast<int>(ring)].bound;
-    const bool holds = x == 0 || std::abs(x) < (1 - kSame) * bound;
+    const bool holds = x == 0 || std::abs(x) < (1 - kSameFigure) * bound;
     return holds ? std::pair(x, 0.0) : std::pair(0.0, x > 0 ? 1.0 : -1.0);
   };
   effects::share_tensions(grips_, 1, force, [&](std::size_t ring, double bound) {
@@ -164,7 +160,7 @@ bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
     largest = std::max(largest, bound);
     laws.set_bound(law, bound);
   });
-  return change > kSame * largest;
+  return change > kSameFigure * largest;
 }
 
 // One law after the other: a term goes to the law added last.

@@ -44,7 +44,7 @@ void JointRows::couple(const Scene& scene, const Bodies& bodies) {
   for (const Coupling& coupling : scene.couplings) {
     const std::vector<std::vector<double>> parts = couplings::polynomials(scene, coupling);
     turns_.push_back({count_, couplings::turn(scene, coupling, parts)});
-    const bool slides = !is_angle(scene.joints[at(coupling.joints[0])]);
+    const bool turns = is_angle(scene.joints[at(coupling.joints[0])]);
     for (std::size_t k = 0; k < parts.size(); ++k) {
       const int j = coupling.joints[k];
       Relation part(Coordinate(scene.joints[at(j)], bodies));
@@ -52,7 +52,7 @@ void JointRows::couple(const Scene& scene, const Bodies& bodies) {
       part.second = part.coordinate.second();
       part.joint = j;
       part.row = count_;
-      part.has_length = slides;
+      part.measures = turns ? MotionOf::angle : MotionOf::length;
       part.polynomial = parts[k];
       std::get<std::vector<Relation>>(rows_).push_back(std::move(part));
     }

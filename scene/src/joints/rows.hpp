@@ -6,7 +6,7 @@
 //   rate_by_time(g_t)           the part of the velocity row that does not come from velocities
 // A row is the sum of its parts where several have its number (Relation).
 // for any scalar, so that the derivatives come from the same formulas. `first` and `second` index
-// the frames of the bodies, `row` is the first row, `has_length` tells a g in m from one in rad.
+// the frames of the bodies, `row` is the first row, `measures` tells a g in m from one in rad.
 #pragma once
 
 #include "coordinate.hpp"
@@ -35,7 +35,7 @@ struct Row {
 /// A point of the first body coincides with a point of the second: 3 rows.
 struct Coincidence : Row {
   static constexpr int count = 3;
-  static constexpr bool has_length = true;
+  static constexpr MotionOf measures = MotionOf::length;
   Vector3d at_first, at_second;
 
   template <int order, class S>
@@ -57,7 +57,7 @@ struct Coincidence : Row {
 /// A direction of the first body stays at right angles to one of the second.
 struct RightAngle : Row {
   static constexpr int count = 1;
-  static constexpr bool has_length = false;
+  static constexpr MotionOf measures = MotionOf::angle;
   Vector3d of_first, of_second;
 
   template <int order, class S>
@@ -87,7 +87,7 @@ struct RightAngle : Row {
 /// axis zero x ahead: sin(angle - s) = 0.
 struct Angle : Row {
   static constexpr int count = 1;
-  static constexpr bool has_length = false;
+  static constexpr MotionOf measures = MotionOf::angle;
   Vector3d of_first, zero, ahead;
   const Now* now = nullptr;
 
@@ -113,7 +113,7 @@ struct Angle : Row {
 /// The point of the first body stays in a plane of the second (or at distance s from it).
 struct Plane : Row {
   static constexpr int count = 1;
-  static constexpr bool has_length = true;
+  static constexpr MotionOf measures = MotionOf::length;
   Vector3d at_first, at_second, normal;  // normal: of the second body
   const Now* now = nullptr;              // null: s = 0
 
@@ -138,7 +138,7 @@ struct Plane : Row {
 /// Two points stay at the distance L = length + s: (|d|^2 - L^2) / (2 length).
 struct Distance : Row {
   static constexpr int count = 1;
-  static constexpr bool has_length = true;
+  static constexpr MotionOf measures = MotionOf::length;
   Vector3d at_first, at_second;
   double length = 1;
   const Now* now = nullptr;  // null: s = 0
@@ -172,7 +172,7 @@ struct Distance : Row {
 /// A part of a coupling: a polynomial without a constant of one coordinate.
 struct Relation : Row {
   static constexpr int count = 1;
-  bool has_length = false;
+  MotionOf measures = MotionOf::angle;
   Coordinate coordinate;
   std::vector<double> polynomial;  // from degree 1 on
 

@@ -9,10 +9,9 @@ namespace tether::scene::joints {
 /// refuse(place, field, value, why) for each rule that a window of the scene breaks.
 template <class Refuse>
 void check_windows(const Scene& scene, const Refuse& refuse) {
-  bool any = false;
+  if (!any_of(scene.joints, [](const Joint& joint) { return joint.window.has_value(); })) return;
   for (const Joint& joint : scene.joints) {
     if (!joint.window) continue;
-    any = true;
     const JointWindow& w = *joint.window;
     const auto wrong = [&](const char* field, double value, const std::string& why) {
       refuse(joint.place, fmt::format("joint \"{}\": {}", joint.name, field),
@@ -25,7 +24,6 @@ void check_windows(const Scene& scene, const Refuse& refuse) {
     if (w.from > 0 && joint.motion)
       wrong("from", w.from, "is of a joint without a motion: what attaches later has none");
   }
-  if (!any) return;
   for (const Coupling& coupling : scene.couplings)
     for (const int j : coupling.joints)
       if (const Joint& joint = scene.joints[linalg::at(j)]; joint.window)

@@ -24,8 +24,7 @@ template <class S>
 using Matrix3 = Eigen::Matrix<S, 3, 3>;
 
 constexpr int kBodyDirections = 12;
-constexpr int kPairDirections = 2 * kBodyDirections;
-using Derivatives = Eigen::Matrix<double, kPairDirections, 1>;
+using Derivatives = Eigen::Matrix<double, 2 * kBodyDirections, 1>;
 using Dual = Eigen::AutoDiffScalar<Derivatives>;
 
 inline double value_of(double x) { return x; }

@@ -45,9 +45,8 @@ Bracket narrowed(const F& f, Bracket at, double resolution) {
 /// none. Successive parabolas look for the top.
 template <class F>
 double above_between(const F& f, double a, double fa, double b, double fb) {
-  constexpr int kMostParabolas = 8;
   double m = 0.5 * (a + b), fm = f(m);
-  for (int k = 0; k < kMostParabolas && !(fm > 0); ++k) {
+  for (int k = 0; k < 8 && !(fm > 0); ++k) {
     const double to_a = (fm - fa) / (m - a), to_b = (fb - fm) / (b - m);
     if (!(to_b < to_a)) break;
     const double top = 0.5 * (a + m) - 0.5 * to_a * (b - a) / (to_b - to_a);

@@ -55,8 +55,6 @@ void sync_folder_of(const std::string& file) {
   if (in.descriptor >= 0) fsync(in.descriptor);
 }
 
-constexpr std::size_t kWaiting = 4096;  // bytes; who watches a table sees it grow
-
 /// Whether the name still stands for the open file: its last owner may have removed it.
 bool is_there(const std::string& name, int descriptor) {
   struct stat open_file {
@@ -106,8 +104,8 @@ int open_to_write(const std::string& file, int flags) {
     }
     if (errno != ENXIO) return -1;
     // A sleep ends by every signal that is handled; open() would go on.
-    constexpr timespec kPollInterval{0, 20000000};  // 20 ms
-    if (nanosleep(&kPollInterval, nullptr) != 0)
+    constexpr auto interval = timespec{0, 20000000};  // 20 ms
+    if (nanosleep(&interval, nullptr) != 0)
       throw Interrupted("interrupted while a reader of " + file + " was waited for");
   }
 }
@@ -192,7 +190,8 @@ RowFile::~RowFile() {
 
 void RowFile::put(std::string_view rows) {
   waiting_ += rows;
-  if (waiting_.size() >= kWaiting) flush();
+  // Who watches a table sees it grow.
+  if (waiting_.size() >= 4096) flush();
 }
 
 void RowFile::flush() {

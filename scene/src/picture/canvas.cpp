@@ -14,8 +14,7 @@ namespace tether::scene::picture {
 
 namespace {
 
-constexpr double kCharacter = 0.6;                 // em
-constexpr double kAscent = 0.85, kDescent = 0.25;  // em
+constexpr double kCharacter = 0.6;  // em
 
 constexpr const char* kHatch =
     "<defs><pattern id=\"hatch\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" "
@@ -179,9 +178,8 @@ void Canvas::begin_note(const std::string& text) {
 }
 
 void Canvas::avoid(const Vector2d& from, const Vector2d& to) {
-  constexpr double kPart = 4;
   if (!drawable({from, to})) return;
-  const int parts = std::max(1, static_cast<int>(std::min((to - from).norm() / kPart, 1000.0)));
+  const int parts = std::max(1, static_cast<int>(std::min((to - from).norm() / 4, 1000.0)));
   for (int k = 0; k <= parts; ++k) {
     const Vector2d p = from + (to - from) * k / parts;
     avoided_.push_back({p.x() - 1.5, p.y() - 1.5, p.x() + 1.5, p.y() + 1.5});
@@ -195,8 +193,9 @@ bool Canvas::text(const std::string& text, const std::vector<Spot>& places, cons
   for (const bool crossing : {false, true})
     for (const Spot& place : places) {
       const double left = place.at.x() - 0.5 * width * static_cast<int>(place.anchor);
-      const Box box{left, place.at.y() - kAscent * font.size, left + width,
-                    place.at.y() + kDescent * font.size};
+      // Its letters reach so far above and below the line.
+      const Box box{left, place.at.y() - 0.85 * font.size, left + width,
+                    place.at.y() + 0.25 * font.size};
       if (!inside.holds(box) || !is_free(box, taken_)) continue;
       if (!crossing && !is_free(box, avoided_)) continue;
       taken_.push_back(box);

@@ -63,14 +63,14 @@ std::map<Bodies, double> depths_at_start(const Scene& scene) {
 }  // namespace
 
 std::vector<std::string> overlaps_at_start(const Scene& scene) {
-  constexpr double kRounded = 1e-2;  // of a size: places of three digits are nearer than that
   std::map<Bodies, double> depths = depths_at_start(scene);
   for (const Joint& joint : scene.joints)  // which let their bodies pass through each other
     if (joint_rows(joint) >= 3) depths.erase(std::minmax(joint.first, joint.second));
   const auto body = [&](int k) -> const Body& { return scene.bodies[static_cast<std::size_t>(k)]; };
   std::vector<std::pair<double, Bodies>> deep;
   for (const auto& [pair, depth] : depths)
-    if (depth > kRounded * std::min(size_of(body(pair.first)), size_of(body(pair.second))))
+    // Places of three digits are nearer than that.
+    if (depth > 1e-2 * std::min(size_of(body(pair.first)), size_of(body(pair.second))))
       deep.emplace_back(depth, pair);
   std::sort(deep.rbegin(), deep.rend());
   std::vector<std::string> out;

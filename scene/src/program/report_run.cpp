@@ -62,10 +62,9 @@ std::string text(const std::vector<double>& value) {
   return out + "]";
 }
 
-std::string verdict(const Judgement& j) {
-  if (j.beyond) return "beyond";
-  if (!j.judged) return "NOT REACHED";
-  return j.met ? "met" : "NOT MET";
+const char* text(Verdict verdict) {
+  constexpr const char* kTexts[] = {"NOT REACHED", "beyond", "met", "NOT MET"};  // as enumerated
+  return kTexts[static_cast<std::size_t>(verdict)];
 }
 
 std::string bound(const Expect& e) {
@@ -173,15 +172,14 @@ void print_times(const RunResult& r, double wall) {
 
 void print_judgements(const Scene& scene, const RunResult& r) {
   if (scene.expect.empty()) return;
-  const auto met = count_if(r.judgements, [](const Judgement& j) { return j.judged && j.met; });
-  const auto beyond = count_if(r.judgements, [](const Judgement& j) { return j.beyond; });
-  fmt::print("expectations: {} of {} met{}\n", met, scene.expect.size(),
+  const long beyond = r.count(Verdict::beyond);
+  fmt::print("expectations: {} of {} met{}\n", r.count(Verdict::met), scene.expect.size(),
              beyond > 0 ? fmt::format(", {} beyond the end", beyond) : "");
   Table table({"", "t / s", "quantity", "of", "found", "expected", "error"});
   for (std::size_t i = 0; i < scene.expect.size(); ++i) {
     const Expect& e = scene.expect[i];
     const Judgement& j = r.judgements[i];
-    table.add({verdict(j),
+    table.add({text(j.verdict),
                e.throughout ? fmt::format("to {:g}", e.time) : fmt::format("{:g}", e.time),
                std::string(word(e.quantity)), subject(scene, e), text(j.value), bound(e),
                e.value.empty() ? "" : fmt::format("{:.1e}", j.error)});

@@ -148,8 +148,8 @@ std::vector<double> measure(const Scene& scene, const Expect& expect, const Engi
 Judge::Judge(const Scene& scene)
     : scene_(scene), judgements_(scene.expect.size()), excess_(scene.expect.size(), -kInfinity) {
   for (std::size_t i = 0; i < scene.expect.size(); ++i)
-    judgements_[i].beyond =
-        scene.expect[i].time > scene.end && !same_time(scene.expect[i].time, scene.end);
+    if (scene.expect[i].time > scene.end && !same_time(scene.expect[i].time, scene.end))
+      judgements_[i].verdict = Verdict::beyond;
 }
 
 void Judge::judge(double event, bool record, const Engine& engine, double start_energy) {
@@ -174,8 +174,8 @@ void Judge::judge(double event, bool record, const Engine& engine, double start_
       judgement.value = value;
       judgement.error = error;
     }
-    judgement.judged = judgement.judged || due;
-    judgement.met = judgement.judged && excess_[i] <= 0;
+    if (due || judgement.verdict == Verdict::met || judgement.verdict == Verdict::missed)
+      judgement.verdict = excess_[i] <= 0 ? Verdict::met : Verdict::missed;
   }
 }
 
@@ -185,12 +185,13 @@ void Judge::exchange(binary::Archive io) {
   std::size_t k = 0;
   io.list(all, [&](Judgement& j) {
     if (k == excess.size()) excess.emplace_back();
-    io(j.judged, j.met, j.time, j.error, excess[k++]);
+    io(j.verdict, j.time, j.error, excess[k++]);
     io.list(j.value, [&](double& x) { io(x); });
-    io.demand(j.value.size() <= 4);
+    io.demand(j.value.size() <= 4 && j.verdict <= Verdict::missed);
   });
   if (all.size() != judgements_.size()) return;
-  for (std::size_t i = 0; i < all.size(); ++i) all[i].beyond = judgements_[i].beyond;
+  for (std::size_t i = 0; i < all.size(); ++i)  // the end of this run may be another one
+    if (all[i].verdict <= Verdict::beyond) all[i].verdict = judgements_[i].verdict;
   judgements_ = std::move(all);
   excess_ = std::move(excess);
 }

@@ -64,10 +64,6 @@ std::unique_ptr<Engine> engine_of(const Scene& scene, const Plan& plan, contact:
       word(plan.engine), plan.why));
 }
 
-// Resolved motions change the energy by some tolerances, and by little in steps that roll or stick.
-constexpr double kEnergyChange = 0.1, kEnergyInSteps = 0.01;  // of the largest kinetic energy
-constexpr double kEnergyRounding = 1e-6;                      // of energies whose sum is small
-
 /// One run from its start, or from a saved state, to the end.
 class Run {
  public:
@@ -256,19 +252,19 @@ class Run {
 
   // Tolerances are of places: a motion that is smaller than they, as on a very stiff spring, may
   // take or give any energy.
+  // Resolved ones change it by some tolerances, and by little in steps that roll or stick.
   void warn_of_energy() {
     const auto warn = [this](double change, double part, const char* why) {
-      if (std::abs(change) > part * most_kinetic_ &&
-          std::abs(change) > kEnergyRounding * most_energy_)
+      if (std::abs(change) > part * most_kinetic_ && std::abs(change) > 1e-6 * most_energy_)
         result_.warnings.push_back(
             fmt::format("the energy changes by {:.2g} J, of at most {:.2g} J of motion, {}", change,
                         most_kinetic_, why));
     };
     if (plan_.engine == EngineKind::stepping)
-      warn(diagnostics_.energy_error, kEnergyInSteps,
+      warn(diagnostics_.energy_error, 0.01,
            "in steps in which nothing strikes or slips: stepping.step is too long for the motion");
     else if (plan_.pairs == 0 && effects::keeps_energy(scene_))
-      warn(std::max(summary().largest_change, -summary().lowest_change), kEnergyChange,
+      warn(std::max(summary().largest_change, -summary().lowest_change), 0.1,
            "though nothing takes or gives any: the tolerance does not resolve the motion");
   }
 
@@ -362,9 +358,11 @@ class Run {
 
 }  // namespace
 
-bool RunResult::met() const {
-  return all_of(judgements, [](const Judgement& j) { return j.beyond || (j.judged && j.met); });
+long RunResult::count(Verdict verdict) const {
+  return count_if(judgements, [=](const Judgement& j) { return j.verdict == verdict; });
 }
+
+bool RunResult::met() const { return count(Verdict::open) == 0 && count(Verdict::missed) == 0; }
 
 RunResult run(const Scene& scene, const RunOptions& options) {
   if (scene.output["certificate"].empty()) return Run(scene, options).go();

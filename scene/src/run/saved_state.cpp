@@ -18,7 +18,7 @@ namespace tether::scene {
 namespace {
 
 const std::string kFormat = kStateHead;
-const std::string kThis = kFormat + "4 " TETHER_VERSION "\n";
+const std::string kThis = kFormat + "5 " TETHER_VERSION "\n";
 
 // CRC-32 of IEEE 802.3 (polynomial 0x04c11db7, bits reversed): finds every damage of up to 32 bits
 // in a row, and any other but for one in 4e9.
@@ -43,12 +43,11 @@ std::string all_of(const std::string& file, const std::function<bool()>& interru
   if (in.descriptor < 0) throw std::runtime_error("cannot open the saved state " + file);
   // A device has no end; states hold a few hundred bytes a body.
   constexpr std::size_t kLargest = std::size_t{1} << 32;
-  constexpr int kPollMilliseconds = 100;
   std::string all, block(std::size_t{1} << 16, '\0');
   const auto is_state = [&] { return all.compare(0, kFormat.size(), kFormat) == 0; };
   while (all.size() <= kLargest) {
     pollfd ready{in.descriptor, POLLIN, 0};
-    if (poll(&ready, 1, kPollMilliseconds) <= 0) {
+    if (poll(&ready, 1, 100) <= 0) {  // ms
       if (interrupted && interrupted())
         throw Interrupted("interrupted while the saved state " + file + " was waited for");
       continue;

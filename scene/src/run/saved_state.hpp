@@ -1,6 +1,6 @@
 // Tether: the file of a saved state. SPDX-License-Identifier: BSD-3-Clause
 //
-//   tether state 4 <version of Tether>\n
+//   tether state 5 <version of Tether>\n
 //   scene, u64       hash of all that moves it
 //   length, u64      of the content
 //   content

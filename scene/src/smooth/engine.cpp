@@ -16,9 +16,6 @@ using namespace smooth;
 
 constexpr binary::Magic kMagic = {'s', 'm', 'o', 'o', 't', 'h', ' ', '2'};
 
-// Errors that may be left then; velocities may have more, since weak rows near a singular position
-// leave it.
-constexpr double kLeft = 1e-7, kSpeedLeft = 1e-5;
 // Closed to rounding already, of the largest unknown: thin rows magnify it into moves that lead
 // nowhere.
 constexpr double kRounding = 1e-14;
@@ -62,7 +59,8 @@ class SmoothEngine : public Engine {
         y_ = start.y();
         system_->keep_invariants_of(start_time_, y_);
       }
-      check_start(kLeft, kSpeedLeft, "may be left where joints contradict each other in a loop");
+      // Velocities may have more, since weak rows near a singular position leave it.
+      check_start(1e-7, 1e-5, "may be left where joints contradict each other in a loop");
     }
     renew(start_time_, y_, std::vector<double>(system_->kept()));
     if (scene.certificate)

@@ -15,8 +15,7 @@ double local_tolerance(const SmoothOptions& options) {
   const double wanted = 0.1 * options.tolerance;
   const double tighter = std::min(1.0, std::pow(options.tolerance / 1e-4, 1.0 / 6.0));
   // Below the first rounding decides, not the number of steps.
-  constexpr double kRounding = 1e-11, kSmallest = 1e-13;
-  return std::max({tighter * wanted, std::min(wanted, kRounding), kSmallest});
+  return std::max({tighter * wanted, std::min(wanted, 1e-11), 1e-13});
 }
 
 // Noise of velocities across the joints, times pivot^2; see widening().

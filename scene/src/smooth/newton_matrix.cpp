@@ -60,9 +60,8 @@ Int given_order(Int count, Int*, Int*, Int* order, Common* settings) {
 // bodies; pivots then leave its order, and the fill is large. COLAMD leaves the diagonal from the
 // start.
 void use_order(SUNLinearSolver solver, std::vector<int>& order) {
-  constexpr int kOwnOrder = 3;
   auto* settings = SUNLinSol_KLUGetCommon(solver);
-  settings->ordering = kOwnOrder;
+  settings->ordering = 3;  // our own
   settings->btf = 0;
   settings->user_order = given_order;
   settings->user_data = &order;
@@ -157,9 +156,8 @@ void NewtonMatrix::find_entries_nearby(double t, N_Vector y, N_Vector yp) {
   const std::vector<double> y0(state, state + system_.size()), yp0(rate, rate + system_.size());
   std::mt19937 random(1);
   const auto moved = [&](std::vector<double> x) {
-    constexpr double kFar = 0.25;
     for (double& value : x)
-      value += kFar * (random() / 2147483648.0 - 1.0) * std::max(1.0, std::abs(value));
+      value += 0.25 * (random() / 2147483648.0 - 1.0) * std::max(1.0, std::abs(value));
     return x;
   };
   for (const double cj : {1.0, 0.7}) {

@@ -312,7 +312,7 @@ double System::drift(double t, const double* y) {
     largest = std::max(largest, std::abs(value) * unit);
   };
   rows_.each([&](const auto& row) {
-    const double length = row.has_length ? units_.length : 1;
+    const double length = row.measures == joints::MotionOf::length ? units_.length : 1;
     for (int i = 0; i < row.count; ++i) {
       take(joint_values_[row.row + i], length);
       take(joint_values_[rows() + row.row + i], length / units_.time);

@@ -8,8 +8,6 @@ namespace {
 // A normal impulse that changes by more from step to step is one of an impact, or of a force that
 // the steps do not resolve.
 constexpr double kSteady = 2;
-// A contact with more of its largest friction may slip in a part of the step.
-constexpr double kHolds = 0.99;
 
 }  // namespace
 
@@ -57,8 +55,9 @@ bool EnergyError::note(const contact::StepContacts& contacts) {
     const double normal = c.normal.dot(contacts.impulses[k]);
     if (!(normal > 0)) continue;
     const double friction = (contacts.impulses[k] - normal * c.normal).norm(), last = before(c.id);
+    // A contact with more of its largest friction may slip in a part of the step.
     steady = steady && normal <= kSteady * last && last <= kSteady * normal &&
-             (friction == 0 || friction < kHolds * c.mu * normal);
+             (friction == 0 || friction < 0.99 * c.mu * normal);
     now_.emplace_back(c.id, normal);
   }
   steady = steady && now_.size() == last_.size();

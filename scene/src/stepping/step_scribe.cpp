@@ -126,7 +126,7 @@ void StepScribe::note_push(const char* effect) {
 bool StepScribe::is_at(double time, const std::vector<int>& bodies) const {
   for (const int i : bodies) {
     const Reached& reached = chain_[at(i)];
-    if (std::abs(reached.time - time) > kSameBoundary * stepper_.options().step ||
+    if (std::abs(reached.time - time) > kSameFigure * stepper_.options().step ||
         !same(reached.state, state(i)))
       return false;
   }
@@ -267,10 +267,10 @@ void StepScribe::put_laws(std::string& out, double t, double dt) {
     const double wanted =
         law.is_sprung() ? law.rate - law.stiffness * law.stretch / gain : law.rate;
     const double most = std::min(law.bound * dt, std::numeric_limits<double>::max());
-    Line(out, "law") << k << (law.limit ? 0 : -most)
-                     << (law.limit ? std::numeric_limits<double>::max() : most)
-                     << (law.limit ? 0 : wanted) << (law.is_sprung() ? 1 / (dt * gain) : 0)
-                     << (law.limit ? law.gap : 0) << (law.limit ? law.restitution : 0)
+    Line(out, "law") << k << (law.is_limit() ? 0 : -most)
+                     << (law.is_limit() ? std::numeric_limits<double>::max() : most)
+                     << (law.is_limit() ? 0 : wanted) << (law.is_sprung() ? 1 / (dt * gain) : 0)
+                     << (law.is_limit() ? law.gap : 0) << (law.is_limit() ? law.restitution : 0)
                      << impulses[at(k)] << joints_->name(law.joint);
     for (const auto* term = first; term != last; ++term)
       Line(out, "on") << k << term->body << Vector3d(term->G.head<3>())

@@ -127,7 +127,6 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 
 // The last letter is the format.
 constexpr binary::Magic kMagic = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '9'};
-constexpr double kRounding = 1e-15;  // of the time, beside kSameBoundary
 
 Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
   Mapped out = map_scene(scene);
@@ -222,7 +221,7 @@ void SteppingEngine::add_forces(const Scene& scene) {
 }
 
 void SteppingEngine::advance(double t) {
-  const double slack = kSameBoundary * std::min(stepper_.options().step, t);
+  const double slack = kSameFigure * std::min(stepper_.options().step, t);
   bool moved = false, above = false;
   for (; time() < t - slack && !above && !interrupted(); moved = true) {
     take_step();
@@ -419,7 +418,7 @@ void SteppingEngine::take_over(std::istream& in) {
 // The first step is shorter. It is taken at once: states that are saved are those of boundaries.
 void SteppingEngine::begin_at(double time, const std::vector<BodyState>& states) {
   const double step = stepper_.options().step, nearest = std::round(time / step);
-  const bool boundary = std::abs(time - nearest * step) <= kSameBoundary * step + kRounding * time;
+  const bool boundary = std::abs(time - nearest * step) <= kSameFigure * step + 1e-15 * time;
   const double steps = boundary ? nearest : std::floor(time / step);
   set_bodies(states);
   stepper_.start_anew(std::lround(steps), boundary ? 0 : time - steps * step);

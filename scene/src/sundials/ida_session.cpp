@@ -11,9 +11,6 @@ namespace tether::scene {
 
 namespace {
 
-constexpr double kFirstError = 0.125;     // of what IDA allows
-constexpr double kFirstMove = 1e-2;       // the part by which a component moves at most
-constexpr double kFirstAtRest = 1e-3;     // s
 constexpr double kDifferencePart = 1e-5;  // the part of a move over which y'' is differenced
 
 int residual(double t, N_Vector y, N_Vector yp, N_Vector r, void* equations) {
@@ -132,7 +129,7 @@ double first_step(double tolerance, double longest, const Eigen::VectorXd& sizes
   double speed = 0;
   for (Eigen::Index i = 0; i < y.size(); ++i)
     if (sizes[i] != 0) speed = std::max(speed, std::abs(yp[i]) / (sizes[i] + std::abs(y[i])));
-  if (!(speed > 0 && std::isfinite(speed))) return kFirstAtRest;
+  if (!(speed > 0 && std::isfinite(speed))) return 1e-3;  // at rest, s
   const double span = kDifferencePart / speed;
   Eigen::VectorXd ahead = y + span * yp, there(y.size());
   rate(start.t + span, ahead, there);
@@ -144,8 +141,8 @@ double first_step(double tolerance, double longest, const Eigen::VectorXd& sizes
   }
   const double curvature = std::sqrt(sum / static_cast<double>(y.size())) / span;
   if (!std::isfinite(curvature)) return 0.5 * tolerance / speed;
-  const double most = std::min(kFirstMove / speed, longest);
-  return curvature > 0 ? std::min(most, std::sqrt(4 * kFirstError / curvature)) : most;
+  const double most = std::min(1e-2 / speed, longest);
+  return curvature > 0 ? std::min(most, std::sqrt(4 * 0.125 / curvature)) : most;
 }
 
 }  // namespace tether::scene

@@ -193,7 +193,7 @@ double SwitchingEngine::next_switch() const {
 }
 
 bool SwitchingEngine::is_due(double time) const {
-  return this->time() >= time - kSameBoundary * std::min(step_, time);
+  return this->time() >= time - kSameFigure * std::min(step_, time);
 }
 
 // An engine that has stopped early for no interruption is where a joint breaks; one of steps is at

@@ -37,13 +37,20 @@ Squares pass(S, Law, SphereContact*, SphereContact*, Coupled) { absent("friction
 Squares pass(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction"); }
 Squares pass(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
-std::unique_ptr<JointIslands> RollingPart::make_islands(const BodyOptions&, LawUse) {
-  absent("rolling friction");
+void ConeSources::hold_moments(const NearContacts&) { absent("rolling friction"); }
+ConeIslands::ConeIslands(ConeSources& sources, LawUse, const BodyOptions&)
+    : mechanisms_(sources.mechanisms), moments_(own_), solver_(Options()) {
+  absent("joints");
 }
+void ConeIslands::solve(BodySolver&, const std::vector<RigidBody>&,
+                        const std::vector<PointContact>&, BodySolution&) {
+  absent("joints");
+}
+void ConeIslands::set_options(const BodyOptions&) { absent("joints"); }
 
-Restitution::Restitution(RestitutionLaw, const BodyOptions& options, IslandMaker* maker,
-                         LawUse laws)
-    : solver_(options, maker, laws) {
+Restitution::Restitution(RestitutionLaw, const BodyOptions& options, ConeSources& sources,
+                         LawUse use)
+    : sources_(sources), solver_(options, sources, use) {
   absent("restitution");
 }
 void Restitution::choose(const Impacts&, const std::vector<Strike>&, const BodySet&,

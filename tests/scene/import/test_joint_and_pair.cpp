@@ -16,7 +16,7 @@ void check_expectations(const std::string& text) {
   const RunResult result = run(scene);
   CHECK(result.failure.empty());
   REQUIRE_FALSE(result.judgements.empty());
-  for (const Judgement& each : result.judgements) CHECK(each.met);
+  for (const Judgement& each : result.judgements) CHECK(each.verdict == Verdict::met);
 }
 
 }  // namespace

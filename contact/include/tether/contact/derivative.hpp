@@ -53,7 +53,7 @@ struct DerivativeReport {
   DerivativeStatus status = DerivativeStatus::unique;  ///< of the impulses
   /// Every contact is strictly open, sticking or sliding: `kinks` is empty. Otherwise the solution
   /// has one-sided derivatives only, of which one branch's is given.
-  bool strictly_regular = true;
+  bool strictly_regular() const { return kinks.empty(); }
   std::vector<Regime> regimes;  ///< the branch of each contact
   std::vector<Kink> kinks;      ///< contacts near another regime
   int unknowns = 0, rank = 0;   ///< components of touching contacts, and how many are determined

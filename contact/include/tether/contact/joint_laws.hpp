@@ -1,6 +1,7 @@
 // Tether: one-dimensional laws of joints. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <tether/contact/joints.hpp>
 #include <tether/export.hpp>
 #include <vector>
@@ -23,8 +24,10 @@ class JointLaws {
  public:
   /// A law as it was added.
   struct Law {
+    /// Which of the three.
+    enum class Kind : std::uint8_t { limit, bounded, sprung };
     int joint;                          ///< number, for messages
-    bool limit;                         ///< else bounded
+    Kind kind;                          ///< what was added
     double gap;                         ///< m or rad
     double restitution;                 ///< 0 .. 1
     double rate;                        ///< m/s or rad/s
@@ -32,8 +35,8 @@ class JointLaws {
     double stretch = 0;                 ///< m or rad
     double stiffness = 0, damping = 0;  ///< N/m, N s/m; N m/rad, N m s/rad
 
-    /// The third kind, added by add_sprung().
-    bool is_sprung() const { return stiffness > 0 || damping > 0; }
+    bool is_limit() const { return kind == Kind::limit; }    ///< of add_limit()
+    bool is_sprung() const { return kind == Kind::sprung; }  ///< of add_sprung()
   };
 
   void clear();  ///< removes all laws

@@ -16,11 +16,6 @@ namespace {
 
 using linalg::at;
 
-constexpr double kDifference = 1e-5;      // rad, and in parts of the size of what joints hold
-constexpr double kGrows = 1.05;           // w^2 in an iteration: goes on
-constexpr int kMostIterations = 10;       // in a step
-constexpr double kChangeOfEnergy = 0.01;  // of a vibration, by a step whose frequency changes
-
 // Numbers of no pattern that modes could be orthogonal to: multiples of the golden ratio, modulo 1.
 Vector6d any_direction(int body) {
   Vector6d out;
@@ -57,7 +52,8 @@ double JointFrequency::displace(const Mechanisms& mechanisms, BodySet& bodies) {
   for (const Vector6d& v : memory_.mode)
     most = std::max({most, v.head<3>().norm() / size, v.tail<3>().norm()});
   if (!(most > 0) || !std::isfinite(most)) return 0;
-  const double factor = kDifference / most;
+  // 1e-5 rad, and in parts of the size of what joints hold.
+  const double factor = 1e-5 / most;
   for (std::size_t i = 0; i < memory_.mode.size(); ++i) {
     const Vector6d move = factor * memory_.mode[i];
     if (move.isZero(0)) continue;
@@ -122,10 +118,10 @@ void JointFrequency::update(const RowsAt& rows_at, const JointRows& rows,
         memory_.mode[at(i)] = mechanisms.root(i) * any_direction(i);
   }
   double square = memory_.frequency * memory_.frequency;
-  for (int k = 0; k < kMostIterations; ++k) {
+  for (int k = 0; k < 10; ++k) {
     const double last = square;
     square = iterate(rows_at, rows, impulses, t, dt, mechanisms, bodies);
-    if (!(square > kGrows * last)) break;
+    if (!(square > 1.05 * last)) break;
   }
   memory_.frequency = at_end_ = std::sqrt(square);
 }
@@ -138,7 +134,8 @@ void JointFrequency::follow(double acceleration) {
 
 bool JointFrequency::resolves_change(double dt) const {
   const double change = std::abs(memory_.frequency - at_end_) * dt;
-  return !(memory_.frequency * dt * change > kChangeOfEnergy);
+  // A step whose frequency changes may change the energy of a vibration by a hundredth.
+  return !(memory_.frequency * dt * change > 0.01);
 }
 
 }  // namespace tether::contact::detail

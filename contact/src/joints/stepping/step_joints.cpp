@@ -16,18 +16,15 @@ namespace tether::contact::detail {
 
 using Eigen::Vector3d;
 
-namespace {
-
-constexpr int kRowsOfJoint = 3;  // bodies that fewer rows connect may touch
-
 using linalg::at;
 
-}  // namespace
-
 StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet& bodies,
-                       Gyroscopic gyroscopic)
+                       Gyroscopic gyroscopic, ConeSources& sources)
     : equations_(std::move(equations)),
       gyroscopic_(gyroscopic),
+      sources_(sources),
+      mechanisms_(sources.mechanisms),
+      laws_(sources.laws.emplace()),
       v_(bodies.motion.size(), Vector6d::Zero()),
       g_(at(equations_->rows())),
       b_(g_.size()) {
@@ -40,7 +37,7 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
   place_.resize(held_.size());
   for (int m = 0; m < mechanisms_.count(); ++m) {
     const std::vector<int>& list = mechanisms_[m].bodies();
-    for (std::size_t k = 1; k < list.size(); ++k) links.emplace_back(list[k - 1], list[k]);
+    for (std::size_t k = 1; k < list.size(); ++k) sources_.links.emplace_back(list[k - 1], list[k]);
   }
   std::multiset<std::pair<int, int>> pairs;
   for (int row = 0; row < rows_.count(); ++row) {
@@ -48,19 +45,14 @@ StepJoints::StepJoints(std::unique_ptr<JointEquations> equations, const BodySet&
     pairs.insert(std::minmax(rows_.begin(row)->body, rows_.begin(row)[1].body));
   }
   for (auto p = pairs.begin(); p != pairs.end(); p = pairs.upper_bound(*p))
-    if (pairs.count(*p) >= kRowsOfJoint) joined_.push_back(*p);
+    // Bodies that fewer rows connect may touch.
+    if (pairs.count(*p) >= 3) joined_.push_back(*p);
   factored_.clear();  // begin() factors at the present positions
 }
 
 bool StepJoints::are_joined(int first, int second) const {
   return std::binary_search(joined_.begin(), joined_.end(),
                             std::pair<int, int>(std::minmax(first, second)));
-}
-
-// As RollingPart::make_islands.
-std::unique_ptr<JointIslands> StepJoints::make_islands(const BodyOptions& options, LawUse laws) {
-  return std::make_unique<ConeIslands>(mechanisms_, &laws_, laws, options,
-                                       laws != LawUse::limits ? near_ : nullptr, moments);
 }
 
 void StepJoints::list_laws(std::vector<LawState>& out) const {
@@ -121,7 +113,7 @@ void StepJoints::check_laws(const BodySet& bodies) {
   for (int law = 0; law < rows.count(); ++law)
     has_law[at(mechanisms_.mechanism_of(laws_.moving(law, mechanisms_)))] = 1;
   for (const int body : held_)
-    if (has_law[at(mechanisms_.mechanism_of(body))] != 0) under_laws.push_back(body);
+    if (has_law[at(mechanisms_.mechanism_of(body))] != 0) sources_.under_laws.push_back(body);
 }
 
 void StepJoints::FactoredAt::set(const BodySet& bodies, double t) {
@@ -184,7 +176,7 @@ bool StepJoints::meet(BodySet& bodies, double t, double dt) {
     advance_bodies(bodies, dt);
     const double move = least_move(bodies, t + dt, dt);
     if (move <= kNoMove * whole) return left_ <= kMet * whole;
-    if (k == kMoves || !(move <= kHalving * before))
+    if (k == kMoves || !(move <= 0.5 * before))
       return move + left_ <= kMet * whole || is_rounding(bodies);
     before = move;
     for (const int i : held_) v_[at(i)] += change_[at(i)];
@@ -223,7 +215,7 @@ void StepJoints::put_back(BodySet& bodies, double t) {
   double before = INFINITY;
   for (int k = 0; k < kMoves; ++k) {
     const double move = least_move(bodies, t, 1);
-    if (move <= kNoMove * whole || !(move <= kHalving * before)) return;
+    if (move <= kNoMove * whole || !(move <= 0.5 * before)) return;
     before = move;
     for (const int i : held_) {
       bodies.position[at(i)] += change_[at(i)].head<3>();
@@ -240,6 +232,7 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
     change_[i] << bodies.mass[i] * dv.head<3>(),
         spin(bodies.inertia[i], place_[k].orientation, dv.tail<3>());
   }
+  const std::vector<Vector3d>& moments = sources_.moments;
   for (std::size_t c = 0; c < contacts.impulses.size(); ++c) {
     const PointContact& p = contacts.points[c];
     const Vector3d& x = contacts.impulses[c];
@@ -267,29 +260,6 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
           mechanisms_.root(list[k]).transpose() * change_[at(list[k])];
   }
   mechanisms_.impulses(impulses.data());
-}
-
-void StepJoints::add_bounded(bool plastic, const BodySet& bodies,
-                             std::vector<RigidBody>& change) const {
-  const JointRows& rows = laws_.laws.rows();
-  for (int k = 0; k < rows.count(); ++k) {
-    if (laws_.laws[k].limit) continue;
-    const double x = (plastic ? laws_.plastic : laws_.impulses)[at(k)];
-    for (const JointRows::Term* t = rows.begin(k); t != rows.end(k); ++t) {
-      const RigidBody& body = bodies.motion[at(t->body)];
-      change[at(t->body)].velocity += x * body.inverse_mass * t->G.head<3>();
-      change[at(t->body)].angular_velocity += x * (body.inverse_inertia * t->G.tail<3>());
-    }
-  }
-}
-
-void StepJoints::scale_restitution(const std::function<double(int)>& scale) {
-  for (int k = 0; k < laws_.laws.count(); ++k) {
-    const double s = scale(laws_.moving(k, mechanisms_));
-    if (s < 1)
-      laws_.impulses[at(k)] =
-          laws_.plastic[at(k)] + s * (laws_.impulses[at(k)] - laws_.plastic[at(k)]);
-  }
 }
 
 // Laws take no part in impacts.
@@ -352,8 +322,8 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   if (joints->has_laws() && s.options.restitution_law != RestitutionLaw::newton)
     throw std::invalid_argument(
         "Stepper::add_joints: limits, motors and friction of joints need restitution_law = newton");
-  s.add_joints(
-      std::make_unique<detail::StepJoints>(std::move(joints), s.bodies, s.options.gyroscopic));
+  s.add_joints(std::make_unique<detail::StepJoints>(std::move(joints), s.bodies,
+                                                    s.options.gyroscopic, s.cones));
 }
 
 }  // namespace tether::contact

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "joint_frequency.hpp"
-#include "joints/law_rows.hpp"
-#include "stepping/motion/joint_part.hpp"
+#include "joints/cone_islands.hpp"
 
 namespace tether::contact::detail {
 
@@ -18,42 +17,60 @@ namespace tether::contact::detail {
 /// has velocities that the joints allow, then for the changes by contacts. Finally velocities are
 /// projected onto the rows of the end (RATTLE). All impulses act along G', so free mechanisms keep
 /// their linear and angular momentum.
-class StepJoints final : public JointPart {
+class StepJoints {
  public:
+  /// Makes the mechanisms, laws and links of `sources`.
   StepJoints(std::unique_ptr<JointEquations> equations, const BodySet& bodies,
-             Gyroscopic gyroscopic);
+             Gyroscopic gyroscopic, ConeSources& sources);
 
-  bool holds(int body) const override { return mechanisms_.mechanism_of(body) >= 0; }
-  bool are_joined(int first, int second) const override;
-  std::unique_ptr<JointIslands> make_islands(const BodyOptions& options, LawUse laws) override;
-  void set_rolling(const NearContacts& near) override { near_ = &near; }
+  std::vector<double> impulses;         ///< of the last sub-step, by row
+  std::vector<double> impulses_at_end;  ///< the part of them along the rows at its end
+  /// Velocities that predict() has added to bodies that joints hold, for the joints to be met at
+  /// the end of the step, beyond velocities that meet them at its start.
+  std::vector<Vector6d> bend;
+  double drift = 0;  ///< largest |g| at the end of the last sub-step, m or rad
 
-  void begin(BodySet& bodies, double t) override;
-  bool predict(BodySet& bodies, double t, double dt) override;
-  void put_back(BodySet& bodies, double t) override;
-  bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts) override;
+  bool holds(int body) const { return mechanisms_.mechanism_of(body) >= 0; }
+  /// Bodies that a joint of three rows or more connects pass through each other.
+  bool are_joined(int first, int second) const;
+
+  /// Called at the start of a step, before its forces. Positions and velocities that the caller has
+  /// changed are put back onto the joints by the least change. Throws std::invalid_argument on
+  /// joints that contradict each other.
+  void begin(BodySet& bodies, double t);
+  /// Called before the contacts are solved: velocities that meet the joints at the end of the step.
+  /// False: none were found, for instance because the step is too long.
+  bool predict(BodySet& bodies, double t, double dt);
+  /// Makes the least move back onto the joints if something has moved the bodies since begin().
+  void put_back(BodySet& bodies, double t);
+  /// Moves the bodies of the mechanisms to the end of the step. False: it does not meet the joints
+  /// to round-off.
+  bool move(BodySet& bodies, double t, double dt, const StepContacts& contacts);
+  /// An impact has changed the velocities where the bodies are: `impulses` are those that it takes.
   void take_impact(const std::vector<RigidBody>& before, const BodySet& bodies,
-                   const StepContacts& contacts) override;
+                   const StepContacts& contacts);
 
-  bool has_laws() const override { return equations_->has_laws(); }
-  void set_active(bool active) override { laws_.active = active; }
-  bool change_bounds(double dt) override {
+  /// Whether there are laws; then contact problems are solved without contacts, too.
+  bool has_laws() const { return equations_->has_laws(); }
+  /// Whether problems include the laws: not while the bodies of joints wait.
+  void set_active(bool active) { laws_.active = active; }
+  /// Changes the bounds of laws that depend on the impulses of the last problem of velocities, over
+  /// dt. False: they are as they were.
+  bool change_bounds(double dt) {
     return laws_.any(LawUse::all) && equations_->change_bounds(laws_.impulses, dt, laws_.laws);
   }
-  std::vector<double>& law_impulses() override { return laws_.impulses; }
-  void add_bounded(bool plastic, const BodySet& bodies,
-                   std::vector<RigidBody>& change) const override;
-  void scale_restitution(const std::function<double(int)>& scale) override;
-  void list_laws(std::vector<LawState>& out) const override;
-  const std::vector<Strike>& strikes() const override { return laws_.strikes; }
-  const StepperMemory::Vibration& vibration() const override { return frequency_.memory(); }
-  void set_vibration(const StepperMemory::Vibration& v) override { frequency_.set_memory(v); }
+  /// Impulses of the laws in the last sub-step.
+  std::vector<double>& law_impulses() { return laws_.impulses; }
+  void list_laws(std::vector<LawState>& out) const;
+  const std::vector<Strike>& strikes() const { return laws_.strikes; }
+  /// Which steps have to resolve.
+  const StepperMemory::Vibration& vibration() const { return frequency_.memory(); }
+  void set_vibration(const StepperMemory::Vibration& v) { frequency_.set_memory(v); }
 
  private:
   // Relative to the size of the mechanism, the root of mass times squared distance from the origin:
   // an iteration ends at a move of kNoMove, and is accepted below kMet if it stalls.
   static constexpr double kNoMove = 1e-14, kMet = 1e-11;
-  static constexpr double kHalving = 0.5;  // a move that is longer does not converge
   static constexpr int kMoves = 30;
 
   struct Place {
@@ -95,9 +112,9 @@ class StepJoints final : public JointPart {
 
   std::unique_ptr<JointEquations> equations_;
   Gyroscopic gyroscopic_;
-  Mechanisms mechanisms_;
-  LawRows laws_;
-  const NearContacts* near_ = nullptr;  // only where a meeting names rolling friction
+  ConeSources& sources_;
+  Mechanisms& mechanisms_;
+  LawRows& laws_;
   JointRows rows_;
   std::vector<int> bodies_of_rows_;  // of the first rows; -1 behind each
   int laws_in_step_ = -1;            // of the first step

@@ -16,8 +16,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kRounding = 2e-15;  // of the largest coordinate
-
 double norm(const std::vector<double>& u) {
   double sum = 0;
   for (const double x : u) sum += x * x;
@@ -62,7 +60,7 @@ bool StepJoints::is_rounding(const BodySet& bodies) const {
   for (const int i : held_)
     largest = std::max(largest, bodies.position[at(i)].cwiseAbs().maxCoeff());
   for (const double g : g_)
-    if (!(std::abs(g) <= kRounding * largest)) return false;
+    if (!(std::abs(g) <= 2e-15 * largest)) return false;
   return true;
 }
 
@@ -82,8 +80,7 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
     const double move = least_move(bodies, t, 1);
     if (!std::isfinite(move)) return false;
     if (move <= kNoMove * whole) break;
-    if (k > 3 && move > kHalving * before)
-      return move + left_ <= kMet * whole || is_rounding(bodies);
+    if (k > 3 && move > 0.5 * before) return move + left_ <= kMet * whole || is_rounding(bodies);
     before = move;
     for (const int i : held_) {
       bodies.position[at(i)] += change_[at(i)].head<3>();

@@ -22,8 +22,6 @@ namespace {
 
 // By which parts of the thickness shapes are shrunk, in turn.
 constexpr std::array<double, 4> kLess{0, 1e-3, 3e-2, 0.5};
-constexpr double kApart = 1e-4;  // of the thickness: shorter distances are rounding
-constexpr int kIterations = 100;
 
 // Points of the difference a - b, the points of a and of b that they are made of, and weights.
 struct Simplex {
@@ -112,7 +110,7 @@ double nearest_points(const ConvexShape& a, const ConvexShape& b, double less, V
   Simplex s;
   if (!(v.squaredNorm() > 0)) v = Vector3d::UnitZ();
   double before = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < kIterations; ++k) {
+  for (int k = 0; k < 100; ++k) {
     const Vector3d p = a.farthest(-v, less), q = b.farthest(v, less), w = p - q;
     if (k > 0) {
       const bool known = std::any_of(s.y.begin(), s.y.begin() + s.count,
@@ -273,7 +271,7 @@ bool find_separation(const ConvexShape& a, const ConvexShape& b, double margin, 
   for (const double less : kLess) {
     distance = nearest_points(a, b, less, between, out);
     if (less == 0 && distance - a.round - b.round >= margin) return false;
-    if (distance > kApart * thickness) break;
+    if (distance > 1e-4 * thickness) break;  // shorter ones are rounding
     distance = 0;
   }
   if (!(distance > 0)) {

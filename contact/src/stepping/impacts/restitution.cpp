@@ -43,9 +43,9 @@ BodyOptions cold(BodyOptions options) {
   return options;
 }
 
-Restitution::Restitution(RestitutionLaw law, const BodyOptions& options, IslandMaker* maker,
-                         LawUse laws)
-    : law_(law), islands_(maker), solver_(cold(options), maker, laws) {}
+Restitution::Restitution(RestitutionLaw law, const BodyOptions& options, ConeSources& sources,
+                         LawUse use)
+    : law_(law), sources_(sources), islands_(sources.links), solver_(cold(options), sources, use) {}
 
 void Restitution::choose(const Impacts& chosen, const std::vector<Strike>& limits,
                          const BodySet& bodies, StepContacts& contacts) {
@@ -79,7 +79,7 @@ void Restitution::add_laws(bool plastic, const BodySet& bodies,
     each.velocity.setZero();
     each.angular_velocity.setZero();
   }
-  if (laws_ != nullptr) laws_->add_bounded(plastic, bodies, forces);
+  if (sources_.laws) sources_.laws->add_bounded(plastic, bodies, forces);
 }
 
 // An island gains the energy constant + linear s + square s^2 in the step, where s is the scale of
@@ -202,8 +202,9 @@ void Restitution::add_change(BodySet& bodies, StepContacts& contacts) {
   }
   for (std::size_t k = 0; k < contacts.points.size(); ++k)
     contacts.impulses[k] += scale(islands_.root(bodies, contacts.points[k])) * added_[k];
-  if (laws_ != nullptr)
-    laws_->scale_restitution([&](int body) { return gains(body) ? scale(body) : 1; });
+  if (sources_.laws)
+    sources_.laws->scale_restitution(sources_.mechanisms,
+                                     [&](int body) { return gains(body) ? scale(body) : 1; });
 }
 
 int Restitution::apply(BodySet& bodies, StepContacts& contacts) {

@@ -4,8 +4,9 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
+#include "joints/cone_islands.hpp"
 #include "stepping/impacts/impacts.hpp"
-#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 
 namespace tether::contact::detail {
 
@@ -20,10 +21,7 @@ BodyOptions cold(BodyOptions options);
 /// bounce as contacts do.
 class Restitution {
  public:
-  Restitution(RestitutionLaw law, const BodyOptions& options, IslandMaker* maker, LawUse laws);
-
-  /// Problems include the laws of joints.
-  void set_laws(JointPart& joints) { laws_ = &joints; }
+  Restitution(RestitutionLaw law, const BodyOptions& options, ConeSources& sources, LawUse use);
 
   /// Selects the impacts that bounce. `chosen` has the velocities at the start, `bodies` those with
   /// the forces of the step; `limits` are the limits of joints that are struck.
@@ -54,7 +52,7 @@ class Restitution {
   std::vector<Bounce> bounces_;  // those that press, once the problem is solved
   std::vector<int> biased_;      // contacts
   std::vector<int> limits_;      // bodies of joints whose limits bounce
-  JointPart* laws_ = nullptr;
+  ConeSources& sources_;
   // Velocities before the impulses, those that energy is compared with, what the forces of the step
   // add; what restitution adds to velocities without it, to those by motors, and to impulses.
   std::vector<RigidBody> before_, came_, force_, change_, driven_, driven_change_;

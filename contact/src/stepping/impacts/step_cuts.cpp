@@ -15,13 +15,7 @@ namespace {
 
 using linalg::at;
 
-// Contacts that strike within this sub-step strike together: the corners of an edge that
-// rounding has turned would else be struck one by one, and turn it.
-constexpr double kTogether = 1e-3;
 constexpr double kTouches = 1e-10;  // of the size, of the time: a gap that rounding makes of none
-// An approach is none below these parts of what forces add to it, and of the speeds of both points.
-// They decide where the least speed of an impact is 0.
-constexpr double kPresses = 1e-3, kRounding = 1e-6;
 
 double speed(const RigidBody& b, const Eigen::Vector3d& r) {
   return b.velocity.norm() + b.angular_velocity.norm() * r.norm();
@@ -39,8 +33,8 @@ double closing_time(double gap, double came, double more) {
   return 2 * gap / (came + std::sqrt(std::max(0.0, came * came + 4 * more * gap)));
 }
 
-StepCuts::StepCuts(const BodyOptions& options, IslandMaker* maker)
-    : islands_(maker), solver_(cold(options), maker, LawUse::none) {}
+StepCuts::StepCuts(const BodyOptions& options, ConeSources& sources)
+    : islands_(sources.links), solver_(cold(options), sources, LawUse::none) {}
 
 void StepCuts::remember(const WarmStart& solved) {
   pressing_.clear();
@@ -53,7 +47,7 @@ void StepCuts::find_islands(const NearContacts& near, const BodySet& bodies,
                             const StepContacts& contacts) {
   islands_.join(bodies, contacts);
   whole_.assign(bodies.motion.size(), 0);
-  if (laws_ != nullptr) islands_.mark(laws_->under_laws, whole_);
+  if (left_whole_ != nullptr) islands_.mark(*left_whole_, whole_);
   size_.assign(bodies.motion.size(), 0);
   const bool rolling = near.any_rolling();
   for (const PointContact& c : contacts.points) {
@@ -78,7 +72,9 @@ bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const Nea
         speed(bodies.motion[at(c.first)], c.r1) + speed(bodies.motion[at(c.second)], c.r2);
     const double gap = contacts.gaps[at(i.contact)], then = i.speed(gap, dt);
     const std::size_t root = at(islands_.root(bodies, c));
-    const bool cuts = then > kPresses * (i.comes - i.came) && then > kRounding * speeds &&
+    // An approach is none below parts of what forces add to it, and of the speeds of both points,
+    // which decide where the least speed of an impact is 0.
+    const bool cuts = then > 1e-3 * (i.comes - i.came) && then > 1e-6 * speeds &&
                       whole_[root] == 0 && (!many || size_[root] <= kMostContacts);
     time_.push_back(cuts ? i.time(gap, dt) : std::numeric_limits<double>::infinity());
   }
@@ -87,7 +83,9 @@ bool StepCuts::choose(const std::vector<Approach>& impacts, double dt, const Nea
   if (!std::isfinite(when_)) return false;
   if (when_ < kTouches * dt) when_ = 0;
   when_ = when_ > (1 - kTouches) * dt ? dt : when_;
-  const double last = when_ < dt ? when_ + kTogether * dt : std::numeric_limits<double>::max();
+  // Those soon after the first strike with it: the corners of an edge that rounding has turned
+  // would else be struck one by one, and turn it.
+  const double last = when_ < dt ? when_ + 1e-3 * dt : std::numeric_limits<double>::max();
   for (std::size_t k = 0; k < time_.size(); ++k)
     if (time_[k] <= last) striking_.push_back(contacts.points[at(impacts[k].contact)].id);
   std::sort(striking_.begin(), striking_.end());

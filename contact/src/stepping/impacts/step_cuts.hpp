@@ -6,9 +6,10 @@
 #include <tether/contact/stepping.hpp>
 #include <vector>
 
+#include "joints/cone_islands.hpp"
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
-#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 #include "stepping/sub_step.hpp"
 
 namespace tether::contact::detail {
@@ -41,11 +42,11 @@ class StepCuts {
   /// is kept, price of a cut, which is the first stock.
   static constexpr double kShare = 0.05, kMostKept = 16, kPrice = 3;
 
-  StepCuts(const BodyOptions& options, IslandMaker* maker);
+  StepCuts(const BodyOptions& options, ConeSources& sources);
   /// Islands of these bodies are not cut, nor are those with rolling friction: laws of joints, and
   /// moments of contacts, act over a time. (Impacts in turn leave what a limit takes to the
   /// sub-step after them: they need no laws.)
-  void set_laws(const JointPart& joints) { laws_ = &joints; }
+  void leave_whole(const std::vector<int>& bodies) { left_whole_ = &bodies; }
   /// Adds the income of a step.
   void earn() { kept_ = std::min(kept_ + kShare, kMostKept); }
   double kept() const { return kept_; }
@@ -87,7 +88,7 @@ class StepCuts {
   void find_islands(const NearContacts& near, const BodySet& bodies, const StepContacts& contacts);
 
   double when_ = 0, kept_ = kPrice;
-  const JointPart* laws_ = nullptr;
+  const std::vector<int>* left_whole_ = nullptr;
   MovingIslands islands_;
   std::vector<std::size_t> size_;                   // of islands, by their root: contacts
   std::vector<char> marked_, whole_;                // islands, by their root

@@ -5,18 +5,14 @@
 #include <algorithm>
 #include <limits>
 
+#include "joints/stepping/step_joints.hpp"
+
 namespace tether::contact::detail {
 
 using Eigen::Vector3d;
 using linalg::at;
 
-namespace {
-
-constexpr double kNothing = 1e-6;  // of its weight: what presses a body by rounding
-
-}  // namespace
-
-void FreeMotion::list(const BodySet& bodies, const JointPart* joints, Gyroscopic gyroscopic) {
+void FreeMotion::list(const BodySet& bodies, const StepJoints* joints, Gyroscopic gyroscopic) {
   for (std::vector<int>* list : {&moving_, &long_, &free_, &free_round_, &free_long_})
     list->clear();
   spins_.clear();
@@ -80,7 +76,8 @@ void FreeMotion::fall(const Vector3d& gravity, double dt, const StepContacts& co
     double mass = std::numeric_limits<double>::infinity();
     for (const int body : {c.first, c.second})
       if (bodies.mass[at(body)] > 0) mass = std::min(mass, bodies.mass[at(body)]);
-    if (contacts.impulses[k].norm() > kNothing * mass * weight)
+    // By more than rounding.
+    if (contacts.impulses[k].norm() > 1e-6 * mass * weight)
       pressed_[at(islands_.root(bodies, c))] = 1;
   }
   for (const int i : free_)

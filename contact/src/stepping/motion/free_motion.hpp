@@ -6,17 +6,19 @@
 #include <tether/linalg/index.hpp>
 #include <vector>
 
-#include "stepping/motion/joint_part.hpp"
+#include "stepping/motion/moving_islands.hpp"
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
+
+class StepJoints;
 
 /// Which bodies move, and how each of them does: gravity, the gyroscopic term, the places that
 /// velocities take them to. Joints move the bodies that they hold themselves.
 class FreeMotion {
  public:
   /// Lists the bodies anew; joints may be null.
-  void list(const BodySet& bodies, const JointPart* joints, Gyroscopic gyroscopic);
+  void list(const BodySet& bodies, const StepJoints* joints, Gyroscopic gyroscopic);
 
   const std::vector<int>& moving() const { return moving_; }
   bool any_long() const { return !long_.empty(); }  ///< of inertia other than 1

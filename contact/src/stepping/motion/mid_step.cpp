@@ -4,6 +4,8 @@
 #include <limits>
 #include <tether/linalg/index.hpp>
 
+#include "joints/stepping/step_joints.hpp"
+
 #include "stepping/motion/rotation.hpp"
 
 namespace tether::contact::detail {
@@ -50,7 +52,7 @@ const PointContact* MidStep::find(std::uint64_t id) {
 }
 
 void MidStep::turn(NearContacts& near, const Impacts& impacts, const BodySet& bodies,
-                   const JointPart* joints, Gyroscopic gyroscopic, double dt,
+                   const StepJoints* joints, Gyroscopic gyroscopic, double dt,
                    std::vector<PointContact>& contacts) {
   const std::size_t count = bodies.motion.size();
   const auto held = [&](int body) { return joints != nullptr && joints->holds(body); };

@@ -8,9 +8,10 @@
 
 #include "stepping/detection/near_contacts.hpp"
 #include "stepping/impacts/impacts.hpp"
-#include "stepping/motion/joint_part.hpp"
 
 namespace tether::contact::detail {
+
+class StepJoints;
 
 /// A step moves bodies by one velocity v. Bodies that stick or roll and turn keep to their way in
 /// order 2 where contacts hold in the middle of the step,
@@ -25,7 +26,7 @@ class MidStep {
  public:
   /// Adds d to the contacts, but for the impacts, which are at the start.
   void turn(NearContacts& near, const Impacts& impacts, const BodySet& bodies,
-            const JointPart* joints, Gyroscopic gyroscopic, double dt,
+            const StepJoints* joints, Gyroscopic gyroscopic, double dt,
             std::vector<PointContact>& contacts);
 
  private:

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <tether/export.hpp>
@@ -15,14 +16,20 @@ class SolverTeam;
 }
 namespace tether::scene {
 
+/// The outcome of an [[expect]].
+enum class Verdict : std::uint8_t {
+  open,    ///< the run did not reach its time
+  beyond,  ///< its time lies after the end (--end): it does not count
+  met,     ///< it holds
+  missed   ///< it does not
+};
+
 /// Result of an [[expect]]; for one that holds `throughout`, at its worst instant.
 struct Judgement {
-  bool beyond = false;        ///< its time lies after the end (--end): it does not count
-  bool judged = false;        ///< the run reached its time
-  bool met = false;           ///< it holds
-  double time = 0;            ///< s
-  std::vector<double> value;  ///< what was found
-  double error = 0;           ///< largest difference to the value expected, 0 without one
+  Verdict verdict = Verdict::open;  ///< whether it holds
+  double time = 0;                  ///< s
+  std::vector<double> value;        ///< what was found
+  double error = 0;                 ///< largest difference to the value expected, 0 without one
 };
 
 /// Over all records.
@@ -78,7 +85,8 @@ struct RunResult {
   std::vector<std::string>
       warnings;  ///< why the motion is not to be trusted, or the start was not meant
 
-  bool met() const;  ///< every expectation that counts was judged and holds
+  long count(Verdict verdict) const;  ///< judgements that are so
+  bool met() const;                   ///< every expectation that counts was judged and holds
 };
 
 constexpr double kMostSteps = 1e9;    ///< of the stepping engine in a run: end / step

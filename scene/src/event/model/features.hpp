@@ -214,7 +214,8 @@ inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double
 class Support {
  public:
   Support(const Frame<double>& f, const Round& of) : L_(f.R * of.shape), radius_(of.radius) {
-    flat_ = kFlat * L_.norm();
+    // Sine below which a disc is flush with what it touches.
+    flat_ = 1e-9 * L_.norm();
     for (int k = 0; k < 3; ++k) {
       L1_.col(k) = f.W.cross(L_.col(k));
       L2_.col(k) = f.alpha.cross(L_.col(k)) + f.W.cross(L1_.col(k));
@@ -248,8 +249,6 @@ class Support {
   /// How far a disc reaches along n, which is nothing along its axis.
   double reach(const Vector3d& n) const { return (L_.transpose() * n).norm(); }
 
-  static constexpr double kFlat = 1e-9;  // sine below which a disc is flush with what it touches
-
  private:
   Matrix3d L_, L1_, L2_;
   double radius_, flat_ = 0;
@@ -267,11 +266,8 @@ struct RoundOnPlane {
   /// A disc is flush with the plane: it touches in more points than one.
   bool is_flush(const Frame<double>& A, const Frame<double>& B) const {
     return first.is_disc() &&
-           Support(A, first).reach(times(B.R, plane.normal)) < kNearlyFlush * first.size();
+           Support(A, first).reach(times(B.R, plane.normal)) < 1e-6 * first.size();
   }
-
- private:
-  static constexpr double kNearlyFlush = 1e-6;
 };
 
 /// Two round features.

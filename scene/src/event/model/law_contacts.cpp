@@ -11,9 +11,9 @@ LawContacts::LawContacts(const Scene& scene, const mechanics::Bodies& bodies)
   for (int law = 0; law < all.count(); ++law) {
     const contact::JointLaws::Law& from = all[law];
     const bool rubs = laws_.slip(law) != nullptr;
-    if (from.is_sprung() || (!from.limit && !rubs && from.bound == 0)) continue;
+    if (from.is_sprung() || (!from.is_limit() && !rubs && from.bound == 0)) continue;
     Entry each{law, {}, 0, 0};
-    if (from.limit) {
+    if (from.is_limit()) {
       each.of.restitution = from.restitution;
       each.gap_at_zero = from.gap - laws_.sign(law) * laws_.value(law, bodies);
     } else {

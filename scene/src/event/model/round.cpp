@@ -9,8 +9,7 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr int kMostSteps = 60, kMostHalves = 40;
-constexpr double kExact = 4e-16, kEnough = 1e-4, kLongest = 0.5;
+constexpr double kExact = 4e-16;
 
 using Tangents = Eigen::Matrix<double, 3, 2>;
 using Eigen::Matrix2d;
@@ -73,7 +72,7 @@ class Between {
 
   /// The maximum next to n: Newton's steps where f is concave, and as long as they rise.
   Vector3d climb(Vector3d n, const Jet<double>& d, const Vector3d* line, double size) const {
-    for (int k = 0; k < kMostSteps; ++k) {
+    for (int k = 0; k < 60; ++k) {
       const At here = at(n, d);
       const Tangents T = tangents_of(n, line);
       const Vector2d g = T.transpose() * here.g;
@@ -82,10 +81,10 @@ class Between {
       const bool concave = M.trace() > 0 && M.determinant() > 0;
       Vector2d z = g / size;
       if (concave) z = M.inverse() * g;
-      if (z.norm() > kLongest) z *= kLongest / z.norm();
+      if (z.norm() > 0.5) z *= 0.5 / z.norm();
       Vector3d next = (n + T * z).normalized();
       double rise = at(next, d).f - here.f;
-      for (int half = 0; half < kMostHalves && rise < kEnough * g.dot(z) - kExact * size; ++half) {
+      for (int half = 0; half < 40 && rise < 1e-4 * g.dot(z) - kExact * size; ++half) {
         z *= 0.5;
         next = (n + T * z).normalized();
         rise = at(next, d).f - here.f;

@@ -18,8 +18,6 @@ namespace {
 constexpr double kLocked = 1e-12;  // A_nn of the largest
 constexpr double kSolve = 1e-12, kNear = 1e-8;
 constexpr double kFarAbove = 1e5;
-constexpr int kMostRounds = 100;  // of bounds that follow forces, which contract
-constexpr double kStiffest = 1e-6, kStiffer = 0.1, kCompliantWork = 3e7;
 
 /// The cones of a problem, and their rows in it. Those without a bound, and those of contacts that
 /// the joints lock, are left out.
@@ -170,9 +168,9 @@ bool settle(const std::vector<bool>& closed, double none, const FrictionProblem&
 /// `with_slips`: the problem with S.
 bool solve_compliant(const std::vector<bool>& closed, double none, FrictionProblem with_slips,
                      const FrictionProblem& problem, const Regimes& held, FrictionSolution& out) {
-  ProductSolver solver(kCompliantWork);
+  ProductSolver solver(3e7);
   FrictionSolution answer;
-  for (double part = 1; part >= kStiffest; part *= kStiffer) {
+  for (double part = 1; part >= 1e-6; part *= 0.1) {
     with_slips.A = problem.A;
     with_slips.A.diagonal().array() += part * problem.A.diagonal().mean();
     const FrictionSolution found = solver.solve(with_slips);
@@ -261,7 +259,8 @@ AccelerationSolution solve_accelerations(ContactRows& rows, const std::vector<Ve
                                          double part, const std::vector<bool>& closed) {
   for (int round = 0;; ++round) {
     AccelerationSolution out = solve_with_bounds(rows, slides, part, closed);
-    if (!out.contacts.solved || round == kMostRounds || !rows.share_bounds(out.contacts, slides))
+    // Bounds that follow forces contract.
+    if (!out.contacts.solved || round == 100 || !rows.share_bounds(out.contacts, slides))
       return out;
   }
 }

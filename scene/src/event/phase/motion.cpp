@@ -12,9 +12,7 @@ namespace tether::scene::event {
 namespace {
 
 constexpr double kWeakened = 0.3;
-constexpr double kAhead = 1e-5;                           // s in the units of the model
-constexpr double kHeld = 1e-9;                            // of the accelerations
-constexpr double kFactorisation = 4, kGatherWork = 1000;  // operations
+constexpr double kAhead = 1e-5;  // s in the units of the model
 constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
 /// Least band of approach, in the units of the model: slower bounces are as high as rounding.
 constexpr double kLeastSpeed = 1e-7;
@@ -321,7 +319,7 @@ void Motion::find_bounds() {
 void Motion::prepare(double t, const double* y) {
   set(t, y);
   gather();
-  work_done_ += kGatherWork * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
+  work_done_ += 1000 * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
   model_.forces(h_);
   if (!sharing_.empty()) share_bounds();
   for (std::size_t k = 0; k < closed_.size(); ++k)
@@ -339,7 +337,7 @@ void Motion::rate(double t, const double* y, double* y_rate) {
   prepare(t, y);
   if (rows_ > 0) {
     islands_.factor(R_, MC_, row_scale_);
-    work_done_ += kFactorisation * islands_.work();
+    work_done_ += 4 * islands_.work();
     const VectorXd right = -row_scale_.cwiseProduct(r_ + R_ * a_);
     const VectorXd scaled = islands_.solve(right);
     a_.noalias() += MC_ * scaled;
@@ -395,7 +393,7 @@ bool Motion::forces_are_lawful() const {
   const VectorXd left = row_scale_.cwiseProduct(R_ * a_ + r_);
   const double scale = row_scale_.cwiseProduct(r_).norm() + a_.norm();
   return left.size() == 0 ||
-         left.cwiseAbs().maxCoeff() <= std::max(kHeld, bands_.of_accelerations()) * scale;
+         left.cwiseAbs().maxCoeff() <= std::max(1e-9, bands_.of_accelerations()) * scale;
 }
 
 std::vector<VectorXd> Motion::contact_forces() {

@@ -9,8 +9,6 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kLongestFirstStep = 0.1;
-constexpr double kIncrement = 1e-7, kLargestIncrement = 1e-3;
 constexpr double kLargestSlipChange = 0.5;    // of a slip, since Newton's matrix was made
 constexpr double kLargestStateChange = 1e-5;  // of the state, since d(y')/dy was found
 
@@ -30,7 +28,7 @@ Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const 
   const VectorXd id = VectorXd::Ones(N);
   const IdaSession::Start start{0, y, yp, id};
   session_.emplace(context_, start, *this, max_step);
-  const double h = first_step(tolerance, kLongestFirstStep, sizes_, start,
+  const double h = first_step(tolerance, 0.1, sizes_, start,
                               [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
                                 motion.rate(start_ + at, ahead.data(), rate_ahead.data());
                               });
@@ -96,11 +94,11 @@ void Phase::differentiate(double t, const double* y) {
   slope_at_ = near;
   motion_.rate(start_ + t, near.data(), rate_.data());
   // Friction turns with the slip: differences are short against it.
-  const double longest = kLargestIncrement * motion_.smallest_slip();
+  const double longest = 1e-3 * motion_.smallest_slip();
   slope_.setZero(N, N);
   for (int j = 0; j < N; ++j) {
     if (j == motion_.work()) continue;
-    double step = kIncrement * std::max(sizes_[j], std::abs(slope_at_[j]));
+    double step = 1e-7 * std::max(sizes_[j], std::abs(slope_at_[j]));
     if (j >= motion_.coordinates()) step = std::min(step, longest);
     near[j] = slope_at_[j] + step;
     motion_.rate(start_ + t, near.data(), near_rate.data());

@@ -12,13 +12,7 @@ using linalg::at;
 namespace {
 
 constexpr double kContradicts = 1e-10;  // of b
-constexpr double kFollow = 0.99;
-constexpr int kConeSteps = 1000;
-constexpr int kTurns = 50;
-constexpr double kSettles = 0.9;
-constexpr int kSharpenings = 30;
-constexpr double kTurnedByRounding = 1e-15;
-constexpr double kSame = 1e-7;  // of the answer's size: the exact one against the library's
+constexpr double kSame = 1e-7;          // of the answer's size: the exact one against the library's
 
 /// The unknowns of what is closed: normal forces, and forces of slips that stick.
 class HeldRows {
@@ -122,11 +116,11 @@ class HeldRows {
     if (is_lawful(x_)) return true;
     if (!several()) return false;
     VectorXd moved = x_, inside, off = VectorXd::Zero(x_.size());
-    for (int k = 0; k < kConeSteps; ++k) {
+    for (int k = 0; k < 1000; ++k) {
       inside = moved + off;
       project(inside);
       off += moved - inside;
-      moved = x_ + kFollow * free_ * (free_.transpose() * (inside - off - x_));
+      moved = x_ + 0.99 * free_ * (free_.transpose() * (inside - off - x_));
       if (is_lawful(moved)) {
         x_ = moved;
         return true;
@@ -231,7 +225,7 @@ FrictionSolution share_forces(const FrictionProblem& problem, Regimes& regimes) 
   const double none = kNoChange * problem.b.cwiseAbs().maxCoeff();
   FrictionSolution out;
   double off = 0, before = 0;
-  for (int pass = 0; pass < kTurns; ++pass) {
+  for (int pass = 0; pass < 50; ++pass) {
     HeldRows rows(problem, regimes);
     const bool held = rows.solve();
     rows.find_other_forces();
@@ -242,7 +236,7 @@ FrictionSolution share_forces(const FrictionProblem& problem, Regimes& regimes) 
     const Regimes now = regimes;
     before = off;
     off = turn(problem, out, regimes);
-    if (off == 0 || (pass > 0 && off <= none && off >= kSettles * before)) {
+    if (off == 0 || (pass > 0 && off <= none && off >= 0.9 * before)) {
       regimes = now;
       break;
     }
@@ -266,7 +260,7 @@ void sharpen(const FrictionProblem& problem, FrictionSolution& answer) {
                                 : VectorXd(-problem.parts[i].slip_of(answer.x)).normalized();
   }
   VectorXd x, w;
-  for (int pass = 0; pass < kSharpenings; ++pass) {
+  for (int pass = 0; pass < 30; ++pass) {
     HeldRows rows(problem, regimes);
     rows.solve();
     x = rows.forces();
@@ -278,7 +272,7 @@ void sharpen(const FrictionProblem& problem, FrictionSolution& answer) {
       turned = std::max(turned, (slip.normalized() - regimes.directions[i]).norm());
       regimes.directions[i] = slip.normalized();
     }
-    if (turned < kTurnedByRounding) break;
+    if (turned < 1e-15) break;
     if (turned > 1) return;  // it does not settle: the library's answer stands
   }
   // Still an answer of the law?

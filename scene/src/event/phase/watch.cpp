@@ -10,7 +10,6 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr int kPolish = 3;
 constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
 constexpr double kPassing = 0.25;  // of both bodies, from which on a step is searched in parts
@@ -246,7 +245,7 @@ Zero Watcher::locate(Phase& phase, Function f) {
   phase.projected_at(zero.time, zero.y);
   if (slope == 0) return zero;
   double local = slope, last = value(f, phase.start() + zero.time, zero.y), last_time = zero.time;
-  for (int k = 0; k < kPolish; ++k) {
+  for (int k = 0; k < 3; ++k) {
     const double next = std::clamp(last_time - last / local, phase.step_begin(), phase.step_end());
     if (std::abs(next - last_time) <= resolution) break;
     VectorXd there;

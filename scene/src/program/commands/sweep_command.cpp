@@ -63,11 +63,11 @@ const char* status_of(const RunResult& r) {
 std::string row_of(const Scene& scene, const RunResult& r) {
   const Summary& s = r.summary;
   const Counts& c = r.counts;
-  const auto met = count_if(r.judgements, [](const Judgement& j) { return j.judged && j.met; });
-  std::string row = fmt::format(
-      "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.3g}", status_of(r), met, scene.expect.size(),
-      r.time, s.start_energy, s.end_energy, s.lowest_change, s.largest_change, s.drift,
-      s.penetration, s.residual, s.contacts, c.steps, c.contact_problems, c.unsolved, r.seconds);
+  std::string row =
+      fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.3g}", status_of(r),
+                  r.count(Verdict::met), scene.expect.size(), r.time, s.start_energy, s.end_energy,
+                  s.lowest_change, s.largest_change, s.drift, s.penetration, s.residual, s.contacts,
+                  c.steps, c.contact_problems, c.unsolved, r.seconds);
   for (std::size_t k = 0; k < scene.expect.size(); ++k)
     for (int i = 0; i < components(scene.expect[k].quantity); ++i) {
       const std::vector<double>& value = r.judgements[k].value;

@@ -9,7 +9,6 @@ namespace {
 
 using Row6 = Eigen::Matrix<double, 1, 6>;
 
-constexpr double kRankTolerance = 1e-6;
 // Rows whose independent part is smaller are dependent. In nets of balls coefficients of dependent
 // rows reach 1e4. A dependent row that is kept carries a multiplier that nothing determines, and
 // steps collapse.
@@ -52,7 +51,7 @@ SparseJointGradient::SparseJointGradient(const JointRows& rows, const MovingBodi
   rates_.setZero(rows.count());
 }
 
-void SparseJointGradient::factor() { factor(nullptr, kRankTolerance); }
+void SparseJointGradient::factor() { factor(nullptr, 1e-6); }
 
 // A factor of the tolerance that SparseMinimumNorm calls a row dependent at.
 void SparseJointGradient::factor(const std::vector<char>& wanted, double dependent) {
@@ -66,7 +65,6 @@ int SparseJointGradient::independent(std::vector<char>& rows) const {
 }
 
 std::vector<int> SparseJointGradient::dependent() const {
-  constexpr double kMatters = 0.1;  // of the largest share
   if (factors_.dropped() == 0) return {};
   const int k = factors_.rank();
   const std::vector<double> shares = factors_.dependence(k);
@@ -77,7 +75,7 @@ std::vector<int> SparseJointGradient::dependent() const {
   };
   for (int i = 0; i < k; ++i) largest = std::max(largest, share(i));
   for (int i = 0; i < k; ++i)
-    if (share(i) > kMatters * largest) rows.push_back(factors_.pivot(i));
+    if (share(i) > 0.1 * largest) rows.push_back(factors_.pivot(i));
   return rows;
 }
 

@@ -29,10 +29,8 @@ namespace {
 
 constexpr double kDependent = 1e-9;    // pivot of rows of unit length
 constexpr double kSecondOrder = 1e-7;  // of n^T gamma, relative to |gamma|
-constexpr int kMostTrials = 8;         // velocities
 constexpr double kRounding = 1e-11;    // of g, with room for the next steps
-constexpr double kWeakest = 1e-3, kGood = 0.3;
-constexpr int kWait = 4;  // steps between choices while all pivots are good
+constexpr int kWait = 4;               // steps between choices while all pivots are good
 // Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
 // every state; those of closed loops are chosen by their entries.
 constexpr double kLeastWeakByEntries = 1.2e-4;
@@ -41,8 +39,7 @@ constexpr double kLeastWeakByEntries = 1.2e-4;
 
 RowsInUse::RowsInUse(JointRows& rows, MovingBodies& bodies)
     : rows_(rows), bodies_(bodies), count_(rows.count()) {
-  if (by_entries(rows.count(), bodies.count())) {
-    in_place_ = true;
+  if (in_place()) {
     used_.resize(at(count_));
     std::iota(used_.begin(), used_.end(), 0);
     place_of_used_ = used_;
@@ -90,7 +87,7 @@ bool RowsInUse::independent_by_structure() const {
 int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::PivotedQr& qr) {
   const int m = rows_.count(), r = qr.rank();
   const Eigen::Index dependent = m - r, n = gradient_.G.cols(), freedoms = n - r;
-  const int trials = static_cast<int>(std::min<Eigen::Index>(kMostTrials, 2 * freedoms));
+  const int trials = static_cast<int>(std::min<Eigen::Index>(8, 2 * freedoms));
   if (dependent <= 0 || trials <= 0) return 0;
   // The combinations N, of scaled rows: G^T P = Q (R11 R12; 0 0), N = P (-R11^-1 R12; 1).
   const Eigen::MatrixXd R = qr.R(), Q = qr.Q();
@@ -124,7 +121,7 @@ int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::
 }
 
 void RowsInUse::choose(double tolerance) {
-  weak_ = std::min(kWeakest, kRounding / tolerance);
+  weak_ = std::min(1e-3, kRounding / tolerance);
   choose();
 }
 
@@ -136,7 +133,7 @@ void RowsInUse::choose_sparse() {
 
 bool RowsInUse::choose() {
   if (sparse_) choose_sparse();
-  if (count_ == 0 || in_place_) return false;
+  if (count_ == 0 || in_place()) return false;
   before_ = used_;
   gradient_.form(rows_, bodies_);
   Eigen::MatrixXd& G = gradient_.G;
@@ -157,7 +154,7 @@ bool RowsInUse::choose() {
   std::sort(used_.begin(), used_.end());
   std::fill(place_of_used_.begin(), place_of_used_.end(), -1);
   for (int k = count_ - 1; k >= 0; --k) place_of_used_[at(used_[at(k)])] = k;
-  wait_ = pivot > kGood ? kWait : 1;
+  wait_ = pivot > 0.3 ? kWait : 1;
   weakest_ = count_ <= R.rows() ? std::abs(R(count_ - 1, count_ - 1)) : 0;
   choose_multipliers();
   return used_ != before_;

@@ -120,7 +120,7 @@ class RowsInUse {
     return (sparse_ ? sparse_->carriers().has[at(row)] : carries_[at(row)]) != 0;
   }
   /// Many rows, each in its own place for the whole run; one that is not kept now counts as zero.
-  bool in_place() const { return in_place_; }
+  bool in_place() const { return by_entries(rows_.count(), bodies_.count()); }
   bool keeps(int row) const { return sparse_ ? sparse_->keeps(row) : place_of(row) >= 0; }
   /// Grows when other rows carry multipliers: the matrix has other zeros then.
   int multiplier_choices() const { return multiplier_choices_; }
@@ -143,8 +143,7 @@ class RowsInUse {
 
   JointRows& rows_;
   MovingBodies& bodies_;
-  double weak_ = 0;  // pivot below which a row is not used
-  bool in_place_ = false;
+  double weak_ = 0;                          // pivot below which a row is not used
   std::unique_ptr<SparseRowChoice> sparse_;  // in place, with closed loops
   int count_ = 0;
   std::vector<int> used_, before_, place_of_used_;

@@ -22,16 +22,10 @@ namespace tether::scene::smooth {
 namespace {
 
 constexpr double kDependentByEntries = 1.3e-6;  // the least that A A^T + eps allows
-constexpr double kWay = 1e-3;                   // of the free move, of a link's length and in rad
 constexpr int kCloseMoves = 3;
-constexpr double kClosed = 1e-12;  // of a link's length
-constexpr double kStandsOut = 0.1, kGoodChoice = 0.03;
-constexpr int kStepsBetweenSearches = 16;
-constexpr double kUsual = 0.3, kUnusual = 0.1;  // of the best weakest pivot so far
-// Velocities that look for thin rows at once, how often what rows forbid is taken from each, and
-// what they must show of a row of unit length.
-constexpr int kProbes = 16, kReleases = 12, kMostRounds = 20;
-constexpr double kReleased = 1e-15, kShown = 1e-10;
+// Velocities that look for thin rows at once, and what they must show of a row of unit length.
+constexpr int kProbes = 16;
+constexpr double kShown = 1e-10;
 // Part of what a velocity may show by error. A row too few changes the motion, and IDA stops (net
 // of 30 x 30 balls: one); one too many leaves a multiplier undetermined, which costs steps.
 constexpr double kErrorShare = 0.02;
@@ -68,7 +62,7 @@ void SparseRowChoice::add_thin(RowSet& set) {
   Eigen::VectorXd v(n), rates(m);
   Eigen::MatrixXd shown(kProbes, m);
   std::uint32_t random = 1;
-  for (int round = 0, added = 1; round < kMostRounds && added > 0; ++round) {
+  for (int round = 0, added = 1; round < 20 && added > 0; ++round) {
     gradient_.factor(set.has, kDependentByEntries);
     double left = 0;
     for (int probe = 0; probe < kProbes; ++probe) {
@@ -77,7 +71,7 @@ void SparseRowChoice::add_thin(RowSet& set) {
         component = random / 4294967296.0 - 0.5;
       }
       double before = 1, now = 1;
-      for (int k = 0; k < kReleases && now > kReleased; ++k) {
+      for (int k = 0; k < 12 && now > 1e-15; ++k) {
         gradient_.release(v);
         v.normalize();
         gradient_.multiply(v, rates);
@@ -144,11 +138,11 @@ void SparseRowChoice::move_freely(std::vector<double>& y) {
   double largest = 0;
   for (int i = 0; i < n; ++i)
     largest = std::max(largest, std::abs(v[i]) / (i % 6 < 3 ? length : 1.0));
-  if (largest > 1e-6) move(y, kWay / largest * v);
+  if (largest > 1e-6) move(y, 1e-3 / largest * v);
 }
 
 void SparseRowChoice::close(std::vector<double>& y) {
-  const double closed = kClosed * reach();
+  const double closed = 1e-12 * reach();
   Eigen::VectorXd g(rows_.count()), v(6 * bodies_.count()), multipliers(rows_.count());
   v.setZero();
   for (int k = 0; k <= kCloseMoves; ++k) {
@@ -164,21 +158,21 @@ void SparseRowChoice::close(std::vector<double>& y) {
 // The set of `count` rows that is furthest from depending on each other, to a factor of 10; at
 // least to within `weak`. Fewer rows where there are not so many.
 RowSet SparseRowChoice::best(int count, double weak) {
-  for (double stands_out = kStandsOut; stands_out > weak; stands_out *= 0.1) {
+  for (double stands_out = 0.1; stands_out > weak; stands_out *= 0.1) {
     RowSet found = independent_among(all_, stands_out);
     if (found.count >= count) return found;
   }
   return independent_among(all_, weak);
 }
 
-double SparseRowChoice::good() const { return std::min(kGoodChoice, kUsual * usual_); }
+double SparseRowChoice::good() const { return std::min(0.03, 0.3 * usual_); }
 
 // There are never more independent rows than a little way off the start: at loose tolerances bodies
 // are off the joints by more than rounding, and rows that are implied seem independent.
 bool SparseRowChoice::choose(double weak) {
   const RowSet seen = independent_among(carriers_.has, kDependentByEntries);
   if (seen.count >= seen_) usual_ = std::max(usual_, seen.weakest);
-  weak = std::min(weak, kUnusual * usual_);
+  weak = std::min(weak, 0.1 * usual_);
   RowSet carried = carriers_;
   carried.weakest = carriers_.weakest = seen.count < seen_ ? 0 : seen.weakest;
   const bool as_it_was = carried.weakest > kMuchWorse * weakest_found_ && --steps_to_search_ > 0;
@@ -186,7 +180,7 @@ bool SparseRowChoice::choose(double weak) {
     kept_ = std::move(carried);
     return false;
   }
-  steps_to_search_ = kStepsBetweenSearches;
+  steps_to_search_ = 16;
   kept_ = best(carriers_.count, weak);
   weakest_found_ = kept_.weakest;
   if (kept_.count != carriers_.count || carried.weakest > kMuchWorse * kept_.weakest) {

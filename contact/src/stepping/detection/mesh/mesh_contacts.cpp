@@ -12,8 +12,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kBorder = 1e-10;  // of the longest edge: a point so near the border is inside
-
 // Identity of a contact, made of its features, which is the same in every step.
 std::uint64_t key_of(std::uint64_t kind, int a, int b) {
   std::uint64_t x = kind;
@@ -89,7 +87,8 @@ void MeshContacts::touch(const Body& body, const Near& near, NearPoints& out) {
     for (int k = 0; k < 3 && inside; ++k) {
       const Vector3d& c = near.corner[at(k)];
       const Vector3d along = near.corner[at((k + 1) % 3)] - c;
-      inside = n.cross(along).dot(q.on_second - c) >= -kBorder * near.longest * along.norm();
+      // A point so near the border is inside.
+      inside = n.cross(along).dot(q.on_second - c) >= -1e-10 * near.longest * along.norm();
     }
     if (!inside) continue;
     lowest = lowest || q.gap <= low + kUpright * thickness;

@@ -20,7 +20,6 @@ namespace detail {
 namespace {
 
 constexpr int kRim = 8;  // points of a rim
-constexpr int kSide = 2 * kRim;
 
 // Nearest point in the half-plane through the axis: a cylinder is a rectangle there.
 Nearest nearest_on(double radius, double half, const Vector3d& p) {
@@ -113,9 +112,9 @@ class CylinderForm final : public ShapeForm {
     }
     const Vector3d side = s.origin + r * lowest;
     if (std::abs(along) > std::max(kFlatAngle, height / (2 * half)))
-      return out.add(side + end * half * z, end > 0 ? kSide + 1 : kSide);
-    out.add(side - half * z, kSide);
-    out.add(side + half * z, kSide + 1);
+      return out.add(side + end * half * z, end > 0 ? 2 * kRim + 1 : 2 * kRim);
+    out.add(side - half * z, 2 * kRim);
+    out.add(side + half * z, 2 * kRim + 1);
   }
 };
 
