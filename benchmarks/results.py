@@ -56,7 +56,10 @@ COMMANDS = {
                          "Each row: that mechanism alone is off. Problems are generated, from one seed. Work is counted by the library and "
                          "not timed; it is over that of the whole solver, of all solves and of those that both solve.",
                          "python3 benchmarks/contact/ablation/ablation.py"),
-    "contact_collection": ("Contact problems in files", "Time to a residual, beside the solvers of Siconos.",
+    "contact_collection": ("Contact problems in files",
+                           "Problem, contacts, tolerance, measure of the residual; status, processor time, residual, sweeps/factorisations, "
+                           "contacts replaced by others; the solver of Siconos that reaches the tolerance first, and our time over its. "
+                           "Without one: none of Siconos reaches it within a second.",
                            f"{BUILT}/contact/contact_collection $TETHER_CONTACT_DATA --law coulomb --time-limit 1"
                            " | grep -E 'natural_map  |^tolerance|^unsolved'"),
     "contact_proofs": ("Exact solutions proven near those of the contact solver",
@@ -86,7 +89,7 @@ COMMANDS = {
                "470 throws by Pfrommer, Halm and Posa (DAIRLab/contact-nets), other than those that coefficients and settings are "
                "fitted to. Cells are medians, in parentheses upper quartiles. Distance: of the centre and two points of the cube, "
                "whose side is 104.8 mm, in the mean over the throw. What engines that agree with each other leave is not explained "
-               "by a rigid cube with one coefficient each; the last row is what the measured start leaves open.",
+               "by a rigid cube with one coefficient each. The second row is what the measured start leaves open.",
                "cmake --build build/release --target peers >&2 && "
                "python3 benchmarks/tosses/tosses.py build/release/benchmarks/peers $TETHER_TOSSES"),
     "import": ("Robots of other programs as scenes",
@@ -159,6 +162,7 @@ def index():
             text = file.read_text()
             title, (revision, day) = text.split("\n", 1)[0].lstrip("# "), re.findall(r"^- (?:Commit|Date): (.*)", text, re.M)
             lines.append(f"| [{title}]({file.name}) | `python3 benchmarks/results.py {file.stem}` | {revision} | {day} |")
+    lines += ["", "Pictures of [dae_set](dae_set.md): colours are codes, dashes are forms of the problem."]
     for file in sorted(RESULTS.glob("*/*.svg")):
         place = file.relative_to(RESULTS)
         lines += ["", f"![{file.stem.replace('_', ' ')}: error against time]({place})"]

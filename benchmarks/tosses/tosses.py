@@ -237,7 +237,7 @@ def main():
                 pairs = [(thin, motion) for thin, motion in zip((Toss(toss.file, cube['dt'], 2) for toss in tested), found)
                          if thin.is_usable()]
                 again = motions(pool, [thin for thin, _ in pairs], program, setting, value, cube, mu, e)
-                line(chosen.replace(engine, 'Beside the row above: thrown as every other frame says'), again, [motion for _, motion in pairs])
+                line(chosen.replace(engine, 'The same beside itself, started from every other frame'), again, [motion for _, motion in pairs])
     return os.EX_OK
 
 
