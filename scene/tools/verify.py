@@ -277,8 +277,8 @@ class Judge:
         along, across, holds = (0.0, 0.0, 0.0) if rule == "frictionless" else (pair.along, pair.across, pair.static)
         axis = states[owner].q.turn(bodies[owner].axis) if along != across else NONE
         more, w = max(holds / along, 1) if along else 1, behind + c.slip + n * c.bias
-        off, *held = (natural_residual(k * along, k * across, axis, rule == "maximum_dissipation", n, c.x * light, w) for k in dict.fromkeys((1, more)))
-        off = min([off, *(max(each, abs(w.beside(n))) for each in held)])
+        residual = lambda k: natural_residual(k * along, k * across, axis, rule == "maximum_dissipation", n, c.x * light, w)
+        off = min(residual(1), max(residual(more), abs(w.beside(n)))) if more > 1 else residual(1)
         if not part:
             self.expect("contact closed", 1e-4, abs(c.gap), 1, name)
             self.expect("law of contact at an instant", 1e-4, off, 1 + speeds + spins, name, 1e-6 * abs(c.x) * light)
