@@ -43,7 +43,8 @@ COMMANDS = {
                 "gate of theirs: it lacks the capacities of the published one, which runs here.",
                 f"{BUILT}/accuracy/dae_set --repeats 1 --seconds 12 --svg benchmarks/results/dae_set"),
     "crossover": ("Where RADAU5's advantage on small smooth problems ends",
-                  "Time and evaluations of F of Tether over those of RADAU5: below 1 Tether needs less.",
+                  "A cell: processor time of Tether over that of RADAU5 (both, ms; evaluations of F of both). Below 1 Tether is faster; "
+                  "nan: one of them does not become that accurate.",
                   f"{BUILT}/accuracy/crossover --repeats 2"),
     "stability": ("Scatter of errors and steps over tolerances",
                   "The rms distance of log10 error and of log10 steps from a straight line over log10 tolerance.",

@@ -145,6 +145,14 @@ std::vector<Sweep> sweep(const Problem& problem, const Codes& codes, double tigh
   return sweeps;
 }
 
+void print_head(const std::string& title, const std::vector<double>& errors) {
+  fmt::print("\n## {}\n\n| |", title);
+  for (const double error : errors) fmt::print(" error {:.0e} |", error);
+  fmt::print("\n|---|");
+  for (std::size_t k = 0; k < errors.size(); ++k) fmt::print("---|");
+  fmt::print("\n");
+}
+
 /// Ours, RADAU5's and their ratio at these errors.
 void print_line(const std::string& title, const std::vector<Sweep>& of,
                 const std::vector<double>& errors) {
@@ -218,7 +226,7 @@ int main(int argc, char** argv) {
   const std::vector<std::string> names = {"Lotka-Volterra", "Kepler", "rigid body",
                                           "pendulum, index 1 x2"};
   if (wants("unknowns")) {
-    fmt::print("ours / RADAU5 at 1e-3, 1e-5, 1e-7, by copies\n");
+    print_head("By copies side by side", errors);
     for (const auto& [name, most] : {std::pair("Lotka-Volterra", 32), std::pair("Kepler", 16),
                                      std::pair("pendulum, index 1 x2", 12)})
       for (int count = 1; count <= most; count *= 2) {
@@ -228,22 +236,22 @@ int main(int argc, char** argv) {
       }
   }
   if (wants("cost")) {
-    fmt::print("cost of F, us, from which on we lead\n");
+    print_head("Cost of F from which on Tether leads", errors);
     for (const std::string& name : names)
       print_cost(name, sweep(copies(name, 1), codes, 1e-12, 1, repeats), errors);
   }
   if (wants("restarts")) {
-    fmt::print("ours / RADAU5 in pieces\n");
+    print_head("In pieces, each begun anew", errors);
     for (const char* name : {"Lotka-Volterra", "Kepler", "rigid body"})
       for (const int pieces : {1, 4, 16, 64})
         print_line(fmt::format("{}, {} pieces", name, pieces),
                    sweep(copies(name, 1), codes, 1e-12, pieces, repeats), errors);
   }
   if (wants("tight")) {
-    fmt::print("ours / RADAU5 at 1e-3 to 1e-11\n");
+    const std::vector<double> tight = {1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11};
+    print_head("At small errors", tight);
     for (const std::string& name : names)
-      print_line(name, sweep(copies(name, 1), codes, 1e-13, 1, repeats),
-                 {1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11});
+      print_line(name, sweep(copies(name, 1), codes, 1e-13, 1, repeats), tight);
   }
   return 0;
 }
