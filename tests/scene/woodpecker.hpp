@@ -39,9 +39,9 @@ class Woodpecker : public tether::scene::event::Model {
     return s;
   }
 
-  void set(double, const double* q, const double* u) override {
-    q_ = Eigen::Map<const Eigen::Vector3d>(q);
-    u_ = Eigen::Map<const Eigen::Vector3d>(u);
+  void set(double, const double* y) override {
+    q_ = Eigen::Map<const Eigen::Vector3d>(y);
+    u_ = Eigen::Map<const Eigen::Vector3d>(y + 3);
   }
   void rates(double* q_rate) const override { std::copy_n(u_.data(), 3, q_rate); }
   void divide_by_mass(Eigen::Ref<MatrixXd> X) const override { X = (inverse_ * X).eval(); }

@@ -102,10 +102,9 @@ class DeficientFactors final : public EquationFactors {
   // The factors weigh contradicting equations by the lengths of rows. The part outside of the range
   // is removed first, so that both are the pseudoinverse and each is the transpose of the other.
   void solve(PackedVector* y) override {
-    constexpr double kConsistent = 1e-10;
     const PackedVectors right(y, y + e_.size());
     solve(factors(false), y);
-    if (factors(false).residual() <= kConsistent) return;
+    if (factors(false).residual() <= 1e-10) return;
     e_.multiply_transposed(right.data(), y);
     solve(factors(true), y);
     solve(factors(false), y);

@@ -13,7 +13,6 @@ using linalg::at;
 
 namespace {
 
-constexpr double kAtOnce = 0.1;  // of the accuracy: what an impact may come too early
 constexpr int kManyImpacts =
     1000;  // in a step: from then on they end it in as many sub-steps at most
 constexpr double kSlips = 1 - 1e-6;  // of the cone
@@ -150,7 +149,7 @@ AccurateSteps::Moment AccurateSteps::moment(double gap, double came, double come
   const double a = (comes - came) / length;
   const double speed = std::sqrt(std::max(0.0, came * came + 4 * a * gap));
   return {closing_time(gap, came, a),
-          kAtOnce * stepper_.options.accuracy * size / std::max(speed, 1e-300)};
+          0.1 * stepper_.options.accuracy * size / std::max(speed, 1e-300)};
 }
 
 AccurateSteps::Moment AccurateSteps::moment(const Impact& i, double length) const {

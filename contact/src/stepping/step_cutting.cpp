@@ -223,9 +223,7 @@ bool StepCutting::take_impact() {
   SubStepper& s = stepper_;
   if (s.bounces_at_once) s.bounces_at_once->choose(*s.impacts, {}, s.bodies, s.contacts);
   const BodySolution& found = s.cuts->solve(s.bodies.motion, s.contacts);
-  ++s.counts.contact_problems;
-  s.counts.sweeps += found.sweeps;
-  s.counts.assembled_islands += found.assembled_islands;
+  s.count(found);
   if (found.status != Status::solved && !(found.error <= accepted_residual(s.options)))
     return false;
   take_velocities(found, s.bodies);

@@ -97,14 +97,18 @@ void SubStepper::choose_bounces() {
                       contacts);
 }
 
+void SubStepper::count(const BodySolution& solved) {
+  ++counts.contact_problems;
+  counts.sweeps += solved.sweeps;
+  counts.assembled_islands += solved.assembled_islands;
+}
+
 void SubStepper::solve_problem() {
   const bool holds = near && near->any_static();
   if (holds) hold_all();
   for (int round = 0;; ++round) {
     solver->solve(bodies.motion, turned, solution);
-    ++counts.contact_problems;
-    counts.sweeps += solution.sweeps;
-    counts.assembled_islands += solution.assembled_islands;
+    count(solution);
     const bool slips = holds && lets_slip();
     // Bounds that follow impulses contract.
     const bool changed = acting_joints && round < 50 && acting_joints->change_bounds(now.length);

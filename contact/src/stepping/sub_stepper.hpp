@@ -51,6 +51,7 @@ struct SubStepper {
 
   void remember(BodiesState& state) const;
   void restore(const BodiesState& state);
+  void count(const BodySolution& solved);  // into `counts`
   StepMark mark() const;
   void go_back(const StepMark& mark);
 

@@ -42,10 +42,6 @@ double graze_tolerance(double tolerance, double speed) {
 }
 
 constexpr long kMostAtOneTime = 300;
-// Steps that cover less than this part of what is left come to no end: at a microsecond each some
-// thousand years.
-constexpr long kManySteps = 100000;
-constexpr double kNoWay = 1e-12;
 
 using linalg::at;
 
@@ -77,7 +73,7 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   start_.y.setZero(motion_.size());
   start_.y.head(motion_.work()) = y;
   counts_ = start.so_far;
-  model_.set(t, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   model_.settle();
   if (start.gap > 0) close_contacts(start);
   check_start();
@@ -91,7 +87,7 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
   motion_.leave_energy_free();
   if (!move_onto_constraints(motion_, local_, t, start_.y))
     throw std::invalid_argument("the start of the scene contradicts its joints or contacts");
-  model_.set(t, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   motion_.choose(t, start_.y, modes);
   begin_phase();
 }
@@ -220,8 +216,7 @@ bool Driver::repeat_phase() {
   double tolerance = std::max(watcher_.deciding_tolerance(), kLeastInFlight);
   if (next_ && next_->what == Watch::gap && !next_->was_near) {
     double rate = 0;
-    model_.set(phase_->start() + next_->time, next_->y.data(),
-               next_->y.data() + motion_.coordinates());
+    model_.set(phase_->start() + next_->time, next_->y.data());
     model_.gap(next_->contact, rate);
     tolerance = std::min(tolerance, graze_tolerance(options_.tolerance, std::abs(rate)));
   }
@@ -256,11 +251,12 @@ bool Driver::Memory::is_sound() const {
   return sound;
 }
 
-// Fails if the steps since the last event are too short for the time that is left.
+// Fails if the steps since the last event are too short for the time that is left: steps that cover
+// 1e-12 of it come to no end, at a microsecond each in some thousand years.
 void Driver::check_pace(double t) const {
   const long steps = paced_.steps + phase_->counts().steps;
   const double way = paced_.way + phase_->step_end();
-  if (steps < kManySteps || !(way < kNoWay * (t - time_))) return;
+  if (steps < 100000 || !(way < 1e-12 * (t - time_))) return;
   fail(
       fmt::format("the last {} steps are {:.3g} s together, and {:.3g} s are left: a motion too "
                   "fast for its length of time",
@@ -307,7 +303,7 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
   counts_.impacts = memory.impacts;
   for (std::size_t i = 0; i < memory.axes.size(); ++i)
     model_.set_axis(static_cast<int>(i), memory.axes[i]);
-  model_.set(time_, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   model_.settle();
   motion_.keep_energy(memory.kept_energy);
   motion_.choose(time_, start_.y, memory.modes);
@@ -321,7 +317,7 @@ VectorXd Driver::state() {
   const double since = time_ - start_.time;
   if (since > 0 && phase_->step_end() > 0)
     phase_->projected_at(std::min(std::max(since, phase_->step_begin()), phase_->step_end()), y);
-  model_.set(time_, y.data(), y.data() + motion_.coordinates());
+  model_.set(time_, y.data());
   return y;
 }
 
@@ -355,7 +351,7 @@ void Driver::handle(const Zero& zero) {
   start_.time = now;
   check_storm();
   start_.y = zero.y;
-  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   model_.settle();
   const bool closing = zero.what == Watch::gap;
   const std::vector<int> close = touching(zero.contact);
@@ -409,7 +405,7 @@ void Driver::begin_phase() {
   const VectorXd before = start_.y;
   if (!move_onto_constraints(motion_, local_, start_.time, start_.y)) {
     start_.y = before;
-    model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
+    set_model();
     fail(contradiction());
   }
   start_phase();
@@ -449,7 +445,7 @@ void Driver::start_phase(double most) {
   start_.axes.resize(start_.modes.size());
   model_.begin_anew(start_.time);
   motion_.choose(start_.time, start_.y, start_.modes);
-  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   std::vector<bool> leaving(at(model_.contacts()), false);
   double local = std::min(local_, most);
   for (int i = 0; i < model_.contacts(); ++i) {
@@ -560,7 +556,7 @@ void Driver::close_contacts(const StartState& start) {
   if (!move_onto_constraints(motion_, local_, time_, start_.y))
     throw SimulationError("contacts of a step cannot be closed together");
   motion_.choose(time_, start_.y, std::vector<ContactMode>(at(model_.contacts())));
-  model_.set(time_, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   model_.settle();
 }
 

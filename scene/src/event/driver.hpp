@@ -105,6 +105,8 @@ class Driver {
 
  private:
   const Bands& bands() const { return motion_.bands(); }
+  auto u() { return start_.y.segment(motion_.coordinates(), motion_.velocities()); }
+  void set_model() { model_.set(start_.time, start_.y.data()); }  // to the state of start_
   void check_start() const;
   void close_contacts(const StartState& start);
   void begin_phase();

@@ -342,7 +342,7 @@ VectorXd EventEngine::coordinates_of(const std::vector<BodyState>& bodies) const
 StartState EventEngine::exactness_of(SceneModel& model, const SteppedState& state,
                                      const VectorXd& y) const {
   constexpr double kLeast = 1e-6;
-  model.set(state.time / units_.time, y.data(), y.data() + model.coordinates());
+  model.set(state.time / units_.time, y.data());
   VectorXd a;
   model.forces(a);
   model.divide_by_mass(a);
@@ -406,20 +406,17 @@ void EventEngine::exchange(binary::Archive& io, Driver::Memory& m, double& reach
 
 void EventEngine::save(std::ostream& out) const {
   Driver::Memory m = driver_->memory();
-  binary::Archive io(out);
-  double seconds = time(), reached = driver_->time();
+  double reached = driver_->time();
   VectorXd now = now_;
-  out.write(kBodiesFirst, sizeof kBodiesFirst);
-  exchange_bodies(io, seconds, bodies_);
-  out.write(kMagic, sizeof kMagic);
+  write_bodies(out, time(), bodies_, kMagic);
+  binary::Archive io(out);
   exchange(io, m, reached, now);
 }
 
 void EventEngine::restore(std::istream& in, Restore how) {
   binary::Archive io(in);
-  skip_bodies(io, in, bodies_.size());
-  if (!binary::begins(in, kMagic))
-    throw std::runtime_error("this is not a state of the event engine");
+  skip_bodies(in, bodies_.size(), kNoState);
+  if (!binary::begins(in, kMagic)) throw std::runtime_error(kNoState);
   Driver::Memory m;
   double reached = 0;
   VectorXd saved;

@@ -233,11 +233,8 @@ void EventsThenSteps::exchange_hand_overs(Self& self, binary::Archive& io) {
 
 void EventsThenSteps::save(std::ostream& out) const {
   if (hand_overs_.empty()) return events_->save(out);
+  write_bodies(out, time(), bodies(), kHandedOver);
   binary::Archive io(out);
-  double seconds = time();
-  out.write(kBodiesFirst, sizeof kBodiesFirst);
-  exchange_bodies(io, seconds, bodies());
-  out.write(kHandedOver, sizeof kHandedOver);
   exchange_hand_overs(*this, io);
   now().save(out);
 }
@@ -259,7 +256,7 @@ void EventsThenSteps::restore(std::istream& in, Restore how) {
   const std::string all{std::istreambuf_iterator<char>(in), {}};
   std::istringstream content(all);
   binary::Archive io(content);
-  skip_bodies(io, content, scene_.bodies.size());
+  skip_bodies(content, scene_.bodies.size(), event::kNoState);
   all_events_.clear();
   hand_overs_.clear();
   closed_.clear();

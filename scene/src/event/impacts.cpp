@@ -18,9 +18,7 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kAgree = 0.05;         // of ratios
-constexpr double kUnresolved = 1e-5;    // m/s in the units of the model: heights near round-off
-constexpr double kLeastHeight = 5e-12;  // of a flight, of the largest coordinate: the same
+constexpr double kAgree = 0.05;  // of ratios
 
 using linalg::at;
 
@@ -46,8 +44,9 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
   const double dt = start_.time - b.time[0], last = b.time[0] - b.time[1];
   // Numbers of thousands, as of scenes in millimetres, lose heights at higher speeds.
   const double largest = start_.y.head(motion_.coordinates()).cwiseAbs().maxCoeff();
-  const bool unseen = approach * dt / 4 <= kLeastHeight * largest;
-  if (approach * approach > b.speed[0] * std::max(options_.tolerance, kUnresolved) && !unseen)
+  const bool unseen = approach * dt / 4 <= 5e-12 * largest;
+  // Heights near round-off, in the units of the model.
+  if (approach * approach > b.speed[0] * std::max(options_.tolerance, 1e-5) && !unseen)
     return false;
   const double r = approach / b.speed[0], previous = b.speed[0] / b.speed[1];
   if (!(r < 1 && std::abs(r - previous) < kAgree * (1 - previous) && dt > 0 &&
@@ -62,7 +61,7 @@ bool Driver::has_accumulated(int contact, double approach, double& rest) const {
 // Returns the energy that is lost.
 double Driver::come_to_rest(const std::vector<int>& touching, double speed, VectorXd& x) {
   ContactRows rows(model_, touching);
-  const VectorXd w = rows.velocities(start_.y.segment(motion_.coordinates(), motion_.velocities()));
+  const VectorXd w = rows.velocities(u());
   std::vector<int> slow;
   for (const ConePart& p : rows.parts()) {
     if (!p.has_normal() || std::abs(w[p.first]) > speed) continue;
@@ -163,7 +162,7 @@ void Driver::refuse_blocked(const ContactRows& rows, const Impact& impact) {
 
 void Driver::strike(const std::vector<int>& set, bool plastic) {
   ContactRows rows(model_, set);
-  const auto u = start_.y.segment(motion_.coordinates(), motion_.velocities());
+  const auto u = this->u();
   const VectorXd before = rows.velocities(u);
   const Impact impact = expect(rows, before, plastic);
   refuse_blocked(rows, impact);
@@ -183,8 +182,8 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
 // Returns the energy that is lost.
 double Driver::change_velocities(const VectorXd& change) {
   const double energy = model_.energy();
-  start_.y.segment(motion_.coordinates(), motion_.velocities()) += change;
-  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
+  u() += change;
+  set_model();
   return energy - model_.energy();
 }
 
@@ -213,12 +212,11 @@ void Driver::record_impacts(const ContactRows& rows, const Impact& impact, const
 std::vector<ContactMode> Driver::decide(const std::vector<int>& touching, const Left& left,
                                         bool may_jam) {
   std::vector<ContactMode> modes(at(model_.contacts()));
-  model_.set(start_.time, start_.y.data(), start_.y.data() + motion_.coordinates());
+  set_model();
   const std::vector<int> candidates = staying(touching, left);
   if (candidates.empty()) return modes;
   ContactRows rows(model_, candidates);
-  const VectorXd velocities =
-      rows.velocities(start_.y.segment(motion_.coordinates(), motion_.velocities()));
+  const VectorXd velocities = rows.velocities(u());
   const std::vector<VectorXd> slides = slides_of(rows, velocities, left);
   ++counts_.contact_problems;
   std::vector<bool> closed;
@@ -330,13 +328,10 @@ void Driver::jam(const ContactRows& rows, const VectorXd& velocities) {
   ++counts_.contact_problems;
   const FrictionSolution answer = solve_friction(problem);
   if (!answer.solved) fail("an impact without collision is not solved");
-  const VectorXd coming =
-      struck_ ? VectorXd(start_.y.segment(motion_.coordinates(), motion_.velocities()))
-              : VectorXd();
+  const VectorXd coming = struck_ ? VectorXd(u()) : VectorXd();
   const double lost = change_velocities(rows.change(answer.x));
   if (struck_) struck_(rows, answer.x, {}, coming, false);
-  const VectorXd after =
-      rows.velocities(start_.y.segment(motion_.coordinates(), motion_.velocities()));
+  const VectorXd after = rows.velocities(u());
   bool first = true;
   for (int k = 0; k < static_cast<int>(rows.parts().size()); ++k) {
     const ConePart& p = rows.parts()[at(k)];

@@ -5,6 +5,8 @@
 
 namespace tether::scene::event {
 
+constexpr const char* kNoState = "this is not a state of the event engine";
+
 /// A state that steps of a length have led to. Gaps and speeds of contacts that rest there are as
 /// large as what such a step makes of the accelerations.
 struct SteppedState {

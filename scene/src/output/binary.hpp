@@ -133,13 +133,22 @@ void exchange_bodies(binary::Archive& io, double& time, Bodies& bodies) {
   }
 }
 
-/// Reads the bodies that a state of events begins with, which it has once more. Throws
-/// std::runtime_error where it does not.
-inline void skip_bodies(binary::Archive& io, std::istream& in, std::size_t count) {
-  if (!binary::begins(in, kBodiesFirst))
-    throw std::runtime_error("this is not a state of the event engine");
+/// Writes the bodies that such a state begins with, and the letters of the part behind them.
+template <class Bodies>
+void write_bodies(std::ostream& out, double time, const Bodies& bodies, const binary::Magic& part) {
+  binary::Archive io(out);
+  out.write(kBodiesFirst, sizeof kBodiesFirst);
+  exchange_bodies(io, time, bodies);
+  out.write(part, sizeof part);
+}
+
+/// Reads such bodies, which the state has once more. Throws std::runtime_error where it does not
+/// begin with them.
+inline void skip_bodies(std::istream& in, std::size_t count, const char* no_such_state) {
+  if (!binary::begins(in, kBodiesFirst)) throw std::runtime_error(no_such_state);
   std::vector<BodyState> bodies(count);
   double seconds = 0;
+  binary::Archive io(in);
   exchange_bodies(io, seconds, bodies);
 }
 

@@ -12,7 +12,6 @@ namespace tether::scene::picture {
 
 namespace {
 
-constexpr std::size_t kMostPaths = 30, kMostNames = 12;
 constexpr std::size_t kMostTriangles = 20000;  // of one surface that is drawn
 constexpr double kNames = 11;                  // pixels
 const Pen kDark{"#404040", 1.2, ""};
@@ -50,7 +49,7 @@ class Drawing {
     const std::vector<std::size_t> order = far_ones_first();
     std::size_t paths = 0;
     for (const std::size_t b : order)
-      if (paths < kMostPaths && draw_path(b)) ++paths;
+      if (paths < 30 && draw_path(b)) ++paths;
     draw_links();
     for (const std::size_t b : order) draw_body(b, last_[b], false, true);
     for (const Spring& spring : scene_.springs) draw_spring(spring);
@@ -357,7 +356,7 @@ class Drawing {
   const std::vector<const Poses*>& motion_;
   const Poses &first_, &last_;
   View view_;
-  bool names_many_ = scene_.moving().size() > kMostNames;
+  bool names_many_ = scene_.moving().size() > 12;
 };
 
 }  // namespace

@@ -20,9 +20,6 @@ namespace {
 using Eigen::Vector3d;
 using Json = nlohmann::json;
 
-constexpr int kAroundOfMany = 10;
-constexpr std::size_t kMostDots = 64;  // single points of a shape that are shown
-
 Json list(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 template <class Quaternion>
 Json wxyz(const Quaternion& q) {
@@ -118,7 +115,8 @@ Json part_entry(const Shape& shape, const View& view, Forms& forms) {
     return part;
   }
   const Mesh m = mesh(shape, 8, 0);
-  for (std::size_t k = 0; k < std::min(kMostDots, m.single.size()); ++k)
+  // Single points of a shape that are shown.
+  for (std::size_t k = 0; k < std::min<std::size_t>(64, m.single.size()); ++k)
     part["dots"].push_back(list(m.points[m.single[k]] / view.length));
   if (m.single.empty()) forms.add_to(part, shape);
   return part;
@@ -149,7 +147,7 @@ View view_of(const Scene& scene) {
 
 /// The object of the page, without what the film adds. `moving`: as in Film.
 Json scene_data(const Scene& scene, const std::vector<std::size_t>& moving, const View& view) {
-  Forms forms(scene.bodies.size() > kManyBodies ? kAroundOfMany : kAround, view);
+  Forms forms(scene.bodies.size() > kManyBodies ? 10 : kAround, view);
   std::map<std::size_t, std::size_t> number;  // of a moving body in the film
   for (std::size_t i = 0; i < moving.size(); ++i) number.emplace(moving[i], i);
   Json bodies = Json::array(), joints = Json::array(), springs = Json::array(),

@@ -16,8 +16,6 @@ namespace {
 
 using namespace picture;
 
-constexpr std::size_t kMostRecords = 1024;
-constexpr std::size_t kMostPoints = 200;  // of a curve
 constexpr Box kPicture{0, 0, 860, 440}, kScenePanel{12, 36, 432, 404};
 constexpr Box kEnergyPanel{506, 76, 846, 182}, kErrorPanel{506, 286, 846, 392};
 
@@ -104,7 +102,7 @@ class PictureRecorder : public Recorder {
               const std::function<double(const Diagnostics&)>& value) const {
     Curve out{{title, colour}, {}};
     const std::vector<Instant>& all = instants_.all();
-    const std::size_t step = 1 + all.size() / kMostPoints;
+    const std::size_t step = 1 + all.size() / 200;
     for (std::size_t i = 0; i < all.size(); i += step) {
       double shown = value(all[i].d);
       if (peaks)
@@ -148,7 +146,7 @@ class PictureRecorder : public Recorder {
   double start_energy_;
   std::size_t bodies_ = 0, events_ = 0;  // events of the engine so far
   std::vector<bool> holds_;              // of each joint: it does at the last record
-  Thinned<Instant> instants_{kMostRecords};
+  Thinned<Instant> instants_{1024};
 };
 
 void add_picture(const std::string& svg, const formats::Beginning& run, formats::Recorders& out) {

@@ -85,7 +85,6 @@ class PolyData {
 using Eigen::Vector3d;
 
 /// Beyond it spheres are points with a radius (filter "Glyph"), not surfaces.
-constexpr std::size_t kMostSurfaces = 1000;
 
 void put(std::vector<float>& out, const Vector3d& v) {
   for (int i = 0; i < 3; ++i) out.push_back(static_cast<float>(v[i]));
@@ -115,7 +114,7 @@ class VtkRecorder : public Recorder {
     for (const Body& body : scene.bodies) {
       meshes_.emplace_back();
       for (const Shape& shape : body.shapes) {
-        const bool as_point = shape.kind == ShapeKind::sphere && surfaces > kMostSurfaces;
+        const bool as_point = shape.kind == ShapeKind::sphere && surfaces > 1000;
         meshes_.back().push_back(as_point ? Part{{{shape.position}, {}, {0}}, shape.radius}
                                           : Part{mesh(shape, kAround, half_plane), 0});
       }

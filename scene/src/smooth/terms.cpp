@@ -95,12 +95,6 @@ void AccelerationJacobian::form() {
   da_ += gradient.GM.transpose() * dlambda_;
 }
 
-namespace {
-
-constexpr double kEpsilon = 1e-11;  // of the diagonal of G M^-1 G^T
-
-}  // namespace
-
 void JointGradient::form(const JointRows& rows, const MovingBodies& bodies) {
   rows.gradient(bodies.all(), G);
   GM.resize(rows.count(), 6 * bodies.count());
@@ -131,7 +125,7 @@ ForwardDynamics::ForwardDynamics(JointRows& rows, MovingBodies& bodies, bool gra
   }
   gradient_.form(rows_, bodies_);
   size_of_row_ = gradient_.S.diagonal();
-  epsilon_ = kEpsilon * size_of_row_;
+  epsilon_ = 1e-11 * size_of_row_;
 }
 
 void ForwardDynamics::solve(const std::vector<Load6>& loads) {

@@ -56,7 +56,6 @@ inline Scene scaled(const Scene& scene, const Units& u) {
 /// sizes. Positions there would lose digits of gaps and joints, and tolerances relative to them
 /// would mean nothing. A multiple of a power of two, so that near bodies are moved exactly.
 inline Eigen::Vector3d origin_of(const Scene& scene) {
-  constexpr double kFarAway = 30;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   int moving = 0;
   for (const Body& body : scene.bodies)
@@ -69,7 +68,7 @@ inline Eigen::Vector3d origin_of(const Scene& scene) {
   double size = 1;
   for (const Body& body : scene.bodies)
     if (!body.fixed) size = std::max(size, (body.position - middle).norm());
-  if (!(middle.norm() > kFarAway * size)) return Eigen::Vector3d::Zero();
+  if (!(middle.norm() > 30 * size)) return Eigen::Vector3d::Zero();
   const double grid = std::exp2(std::ceil(std::log2(size)));
   return (middle / grid).array().round() * grid;
 }

@@ -18,8 +18,6 @@ using namespace mechanics;
 
 namespace {
 
-constexpr double kContradiction = 1e-8;  // of the fastest speed
-
 /// At t = 0 without velocities, and in the states.
 struct Placed {
   Bodies start, now;
@@ -185,7 +183,7 @@ double close(const Scene& scene, double time, const std::vector<int>& closing,
     states[b].angular_velocity += bodies.frames[b].R * change.tail<3>();
   }
   Eigen::Index worst = 0;
-  if (left.size() > 0 && left.cwiseAbs().maxCoeff(&worst) > kContradiction * size)
+  if (left.size() > 0 && left.cwiseAbs().maxCoeff(&worst) > 1e-8 * size)
     throw SimulationError(fmt::format(
         "t = {:g} s: joint \"{}\" cannot close: joints ask for different velocities", time,
         joints::name_of(scene.joints[at(rows.joints[static_cast<std::size_t>(worst)])],

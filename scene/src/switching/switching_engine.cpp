@@ -320,24 +320,17 @@ void SwitchingEngine::exchange(Self& self, binary::Archive& io) {
 }
 
 void SwitchingEngine::save(std::ostream& out) const {
+  write_bodies(out, time(), bodies(), kSwitched);
   binary::Archive io(out);
-  double seconds = time();
-  out.write(kBodiesFirst, sizeof kBodiesFirst);
-  exchange_bodies(io, seconds, bodies());
-  out.write(kSwitched, sizeof kSwitched);
   exchange(*this, io);
   engine_->save(out);
 }
 
 void SwitchingEngine::restore(std::istream& in, Restore how) {
+  const char* const no_such_state = "this is no state of joints that attach, detach or break";
+  skip_bodies(in, scene_.bodies.size(), no_such_state);
+  if (!binary::begins(in, kSwitched)) throw std::runtime_error(no_such_state);
   binary::Archive io(in);
-  double seconds = 0;
-  std::vector<BodyState> states(scene_.bodies.size());
-  if (!binary::begins(in, kBodiesFirst))
-    throw std::runtime_error("this is no state of joints that attach, detach or break");
-  exchange_bodies(io, seconds, states);
-  if (!binary::begins(in, kSwitched))
-    throw std::runtime_error("this is no state of joints that attach, detach or break");
   exchange(*this, io);
   events_.clear();
   engine_.reset();

@@ -202,8 +202,6 @@ std::optional<Value> parse_pieces(std::string_view text, const std::string& name
   return pieces.take();
 }
 
-constexpr std::size_t kShownItems = 8;
-
 std::string in_quotes(std::string_view text) {
   return fmt::format("\"{}{}\"", text.substr(0, kLongestShown),
                      text.size() > kLongestShown ? "..." : "");
@@ -223,7 +221,7 @@ std::string shown(const Value& value) {
       std::string out = "[";
       for (std::size_t i = 0; i < value.items().size(); ++i) {
         if (i > 0) out += ", ";
-        if (i == kShownItems || out.size() > kLongestShown) return out + "...]";
+        if (i == 8 || out.size() > kLongestShown) return out + "...]";
         const Value& item = value.items()[i];
         out += item.kind() == Value::Kind::array ? "[...]" : shown(item);
       }

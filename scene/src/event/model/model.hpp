@@ -78,7 +78,8 @@ class Model {
   virtual double time_unit() const { return 1; }    ///< s, for what users read
   virtual double length_unit() const { return 1; }  ///< m, likewise
 
-  virtual void set(double t, const double* q, const double* u) = 0;
+  /// y: q, then u.
+  virtual void set(double t, const double* y) = 0;
   /// The first time after t at which forces have a kink or jump; infinite: there is none.
   virtual double next_kink(double /*t*/) const { return kInfinity; }
   /// Motion begins anew at t: forces that jump then have jumped.

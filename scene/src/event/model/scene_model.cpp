@@ -12,8 +12,7 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
-constexpr double kOtherNormal = 1e-4;   // squared sine
-constexpr double kFarFromNormal = 0.1;  // squared sine: an axis that the tangents keep to
+constexpr double kOtherNormal = 1e-4;  // squared sine
 
 /// Adds the velocity gradient of a force at a point, times the sign.
 void add_force(const Bodies& bodies, int body, const Vector3d& point, const Vector3d& force,
@@ -118,10 +117,10 @@ std::string SceneModel::contact_name(int contact) const {
   return "\"" + body_names_[at(p.first)] + "\" and \"" + body_names_[at(p.second)] + "\"";
 }
 
-void SceneModel::set(double t, const double* q, const double* u) {
+void SceneModel::set(double t, const double* y) {
   for (int k = 0; k < bodies_.count(); ++k) {
-    std::copy_n(q + 7 * k, 7, y_.data() + kBody * k);
-    std::copy_n(u + 6 * k, 6, y_.data() + kBody * k + kVelocity);
+    std::copy_n(y + 7 * k, 7, y_.data() + kBody * k);
+    std::copy_n(y + coordinates() + 6 * k, 6, y_.data() + kBody * k + kVelocity);
   }
   rows_.set_time(t);
   bodies_.set_time(t);
@@ -133,7 +132,8 @@ void SceneModel::settle() {
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (!axes_[i].isZero(0) && pairs_[i].is_apart(bodies_.all(), 0)) continue;
     const Vector3d normal = pairs_[i].touch(bodies_.all()).normal;
-    if (axes_[i].cross(normal).squaredNorm() > kFarFromNormal) continue;
+    // The tangents keep to an axis that is far from the normal.
+    if (axes_[i].cross(normal).squaredNorm() > 0.1) continue;
     Eigen::Index least = 0;
     normal.cwiseAbs().minCoeff(&least);
     axes_[i] = Vector3d::Unit(least);

@@ -50,7 +50,7 @@ class SceneModel final : public Model {
   void share_bounds(double loaded, const std::vector<LawForce>& forces,
                     std::vector<double>& bounds) const override;
 
-  void set(double t, const double* q, const double* u) override;
+  void set(double t, const double* y) override;
   double next_kink(double t) const override { return effects::next_kink(kinks_, t); }
   void begin_anew(double t) override { bodies_.begin_anew(t); }
   void settle() override;

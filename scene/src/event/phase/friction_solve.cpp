@@ -15,8 +15,7 @@ using linalg::at;
 
 namespace {
 
-constexpr double kLocked = 1e-12;  // A_nn of the largest
-constexpr double kSolve = 1e-12, kNear = 1e-8;
+constexpr double kSolve = 1e-12;
 constexpr double kFarAbove = 1e5;
 
 /// The cones of a problem, and their rows in it. Those without a bound, and those of contacts that
@@ -34,7 +33,7 @@ struct Product {
         cones.push_back(Cone::bounded(p.bound));
         take(p);
       }
-      if (!p.has_normal() || !(problem.A(p.first, p.first) > kLocked * largest)) continue;
+      if (!p.has_normal() || !(problem.A(p.first, p.first) > 1e-12 * largest)) continue;
       take(p);
       double length[2] = {0, 0};  // of the moments about the normal, across it
       for (int k = 0; k < 2; ++k)
@@ -104,7 +103,7 @@ class ProductSolver {
     out.error = found.error;
     out.solved = found.status == contact::Status::solved ||
                  found.status == contact::Status::round_off ||
-                 (found.error < kNear && found.status != contact::Status::infeasible);
+                 (found.error < 1e-8 && found.status != contact::Status::infeasible);
     out.x(product.rows) = found.impulses;
     out.w = problem.A * out.x - problem.b;
     for (std::size_t i = 0; i < problem.parts.size(); ++i)

@@ -13,9 +13,6 @@ namespace {
 
 constexpr double kWeakened = 0.3;
 constexpr double kAhead = 1e-5;  // s in the units of the model
-constexpr double kStill = 1e-3;  // speeds and accelerations in the units of the model
-/// Least band of approach, in the units of the model: slower bounces are as high as rounding.
-constexpr double kLeastSpeed = 1e-7;
 
 /// At most 1; a power of 2, so that rounding does not show in it.
 double part_of(double length) {
@@ -41,8 +38,8 @@ Bands bands_of(Model& model, double tolerance) {
     for (int k = 0; k < kinematics.tangents.rows(); ++k)
       slip =
           std::max(slip, (kinematics.tangents.row(k).transpose().array() * speeds).matrix().norm());
-    out.of.push_back({tolerance * part_of(gap),
-                      std::max(tolerance, kLeastSpeed) * part_of(approach),
+    // In the units of the model slower bounces than 1e-7 are as high as rounding.
+    out.of.push_back({tolerance * part_of(gap), std::max(tolerance, 1e-7) * part_of(approach),
                       tolerance * part_of(slip)});
   }
   return out;
@@ -64,7 +61,7 @@ Motion::Motion(Model& model, double tolerance, double t, const VectorXd& y)
 }
 
 void Motion::set(double t, const double* y) {
-  model_.set(t, y, y + nq_);
+  model_.set(t, y);
   u_ = Eigen::Map<const VectorXd>(y + nq_, nu_);
 }
 
@@ -149,7 +146,7 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   VectorXd y_rate(size());
   rate(t, y.data(), y_rate.data());
   // The energy of bodies at rest is known to rounding only and does not determine the state.
-  keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > kStill;
+  keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > 1e-3;
 }
 
 double Motion::margin_rate(double t, const VectorXd& y, int contact) {

@@ -10,13 +10,10 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kApart = 1e4;  // of the resolution of times
 constexpr double kFewOfBand = 0.02;
-constexpr double kPassing = 0.25;  // of both bodies, from which on a step is searched in parts
 constexpr int kParts = 32;
 constexpr double kFasterWithin = 2;  // a step, than at its ends
 constexpr double kKnown = 5;         // errors of gaps, in the tolerance of the phase
-constexpr double kUnseen = 5;        // of the band of approach: impacts that may be missed
 // Errors of accelerations: by the contact library's tolerance, and by the large slip S.
 constexpr double kNoise = 3e-8, kSlidingNoise = 1e-6;
 
@@ -152,14 +149,14 @@ double Watcher::support() {
 // from its start.
 void Watcher::wake(Phase& phase, const VectorXd& at_end, double by) {
   Model& model = motion_.model();
-  model.set(phase.start() + phase.step_end(), at_end.data(), at_end.data() + motion_.coordinates());
+  model.set(phase.start() + phase.step_end(), at_end.data());
   waking_.clear();
   for (std::size_t k = 0; k < functions_.size(); ++k)
     if (functions_[k].is(State::far) && !model.is_apart(functions_[k].contact, by))
       waking_.push_back(k);
   if (waking_.empty()) return;
   phase.at(phase.step_begin(), y_);
-  model.set(phase.start() + phase.step_begin(), y_.data(), y_.data() + motion_.coordinates());
+  model.set(phase.start() + phase.step_begin(), y_.data());
   for (const std::size_t k : waking_) {
     Function& f = functions_[k];
     f.state = State::waiting;
@@ -173,7 +170,7 @@ void Watcher::wake(Phase& phase, const VectorXd& at_end, double by) {
 void Watcher::evaluate(double t, const VectorXd& y, double by) {
   rate_.resize(motion_.size());
   if (motion_.closed().empty())
-    motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
+    motion_.model().set(t, y.data());
   else
     motion_.rate(t, y.data(), rate_.data());
   for (std::size_t k = 0; k < motion_.closed().size(); ++k)
@@ -194,7 +191,7 @@ void Watcher::evaluate(double t, const VectorXd& y, double by) {
 
 double Watcher::value(Function& f, double t, const VectorXd& y) {
   if (f.what == Watch::gap)
-    motion_.model().set(t, y.data(), y.data() + motion_.coordinates());
+    motion_.model().set(t, y.data());
   else
     motion_.rate(t, y.data(), rate_.data());
   return of_state(f);
@@ -253,7 +250,7 @@ Zero Watcher::locate(Phase& phase, Function f) {
     const double now = value(f, phase.start() + next, there);
     zero.y = there;
     // The slope of two values that differ by rounding would lead anywhere.
-    if (now != last && std::abs(next - last_time) > kApart * resolution)
+    if (now != last && std::abs(next - last_time) > 1e4 * resolution)
       local = (now - last) / (next - last_time);
     last = now;
     last_time = zero.time = next;
@@ -307,7 +304,7 @@ bool Watcher::dips(Phase& phase, const Function& f) {
   const double known = kKnown * part * phase.tolerance();
   if (least < -known || least > known) return least < 0;
   const double turns = (f.slope - f.slope_before) / (end_ - begin_);
-  const double tells = 0.5 * std::pow(kUnseen * bands().approach(f.contact), 2) / turns;
+  const double tells = 0.5 * std::pow(5 * bands().approach(f.contact), 2) / turns;
   const double tolerance = tells / (kKnown * part);
   if (tolerance < undecided_.tolerance) undecided_ = {when, tolerance};
   return false;
@@ -319,7 +316,7 @@ bool Watcher::dips(Phase& phase, const Function& f) {
 bool Watcher::is_hit_between(Phase& phase, Function& f) {
   const double begin = phase.step_begin(), length = phase.step_end() - begin;
   if (f.what != Watch::gap ||
-      !(std::max(f.passes_before, f.passes) * kFasterWithin * length > kPassing))
+      !(std::max(f.passes_before, f.passes) * kFasterWithin * length > 0.25))
     return false;
   Function part = f;
   part.value = f.before;

@@ -47,13 +47,12 @@ struct PlanArguments {
 };
 
 // Who begins inside whom is found by a step, which takes some 2 kB a body.
-constexpr int kMostChecked = 10000;  // bodies
 
 int plan(const PlanArguments& arguments) {
   const Scene scene = read_scene_argument(arguments.file);
   const Plan plan = make_plan(scene);
   std::cout << plan << std::flush;
-  if (plan.bodies <= kMostChecked)
+  if (plan.bodies <= 10000)
     print_start(scene);
   else
     fmt::print("note      tether check tells which of so many bodies begin inside each other\n");

@@ -27,10 +27,9 @@ namespace tether::scene::smooth {
 
 namespace {
 
-constexpr double kDependent = 1e-9;    // pivot of rows of unit length
-constexpr double kSecondOrder = 1e-7;  // of n^T gamma, relative to |gamma|
-constexpr double kRounding = 1e-11;    // of g, with room for the next steps
-constexpr int kWait = 4;               // steps between choices while all pivots are good
+constexpr double kDependent = 1e-9;  // pivot of rows of unit length
+constexpr double kRounding = 1e-11;  // of g, with room for the next steps
+constexpr int kWait = 4;             // steps between choices while all pivots are good
 // Looking at dense rows costs the cube of their number. Of many, those of a tree are independent at
 // every state; those of closed loops are chosen by their entries.
 constexpr double kLeastWeakByEntries = 1.2e-4;
@@ -116,7 +115,7 @@ int RowsInUse::count_needed_beyond(const Eigen::VectorXd& length, const linalg::
     second.col(trial) = N.transpose() * gamma / std::max(gamma.norm(), 1e-12);
   }
   int needed = 0;
-  for (const double each : linalg::singular_values(second)) needed += each > kSecondOrder;
+  for (const double each : linalg::singular_values(second)) needed += each > 1e-7;
   return needed;
 }
 

@@ -25,7 +25,6 @@ using linalg::at;
 // All lengths below are in units of the largest extent of the surface.
 constexpr double kVolume = 1e-6;  // of the volume: parts of the surface's, where all are its own
 constexpr std::size_t kMostParts = 1000;
-constexpr double kMostWork = 4e9;  // comparisons of a point with a plane, some ten seconds
 
 using detail::ClosedSurface;
 using detail::Hollow;
@@ -125,7 +124,7 @@ class Splitter {
  private:
   void work(std::size_t amount) {
     work_ += static_cast<double>(amount);
-    if (work_ > kMostWork) too_much("takes too many comparisons");
+    if (work_ > 4e9) too_much("takes too many comparisons");  // some ten seconds
   }
   [[noreturn]] void too_much(const std::string& what) const {
     solid_.demand_no_crossing();
