@@ -315,14 +315,10 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
     return Status::success;
   }
-  // Algebraic columns do not count: they follow the others, and are not in the error test.
+  // Variables of index 1 that rows are solved for count as well: IDA's error test sees them.
   double length_of_solution() {
     double sum = 0.0;
-    const Block& block = rows_.counted();
-    block.for_columns([&sum, dy = block.dy.data(), w = at_.weight_entries](int k, int i) {
-      const double move = dy[k] * w[i];
-      sum += move * move;
-    });
+    rows_.for_moves([&sum, w = at_.weight_entries](int i, double dy) { sum += square(dy * w[i]); });
     return wrms(sum);
   }
   double length_with(int rank) {

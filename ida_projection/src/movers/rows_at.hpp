@@ -37,7 +37,7 @@ struct Move {
 /// The move dy for the present g by the current factors.
 struct Solution {
   Status status = Status::success;
-  double length = 0.0;  ///< WRMS over the variables of the error test, in tolerances
+  double length = 0.0;  ///< WRMS over all variables that move, in tolerances
   double left = 0.0;    ///< part of the move that an iterative solution has left
   int rank = 0;         ///< of Solve::point: rows that take part, if that is known
 };
