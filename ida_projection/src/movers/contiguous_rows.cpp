@@ -124,6 +124,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     });
     return learns ? learn_trust(length_) : Status::success;
   }
+  bool leaves_no_choice() const { return rows_.leave_no_choice(); }
   bool is_rounding(double move = kAnyMove) override {
     if (std::isfinite(move)) return move <= rounding_length();
     for (std::size_t i = 0; i < g_.size(); ++i)

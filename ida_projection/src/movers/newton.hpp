@@ -72,24 +72,28 @@ class Newton : public RowsAt {
   }
 
   // After several moves that were not needed g alone is evaluated first: rows may be contained in
-  // F, or kept by IDA itself in most steps.
+  // F, or kept by IDA itself in most steps. Rows that leave no choice are moved by the factors of
+  // an earlier candidate as long as moves shrink with these.
   Move move(const Candidate& candidate) final {
     Storage& rows = self();
     Move result;
     const bool tests = run_.nothing_in_row >= kUnneededMoves && may_test();
-    if ((result.status = rows.load(candidate, !tests)) != Status::success ||
-        (result.status = rows.value(candidate.t, !tests)) != Status::success)
+    const bool keeps = rows.leaves_no_choice() && may_test(), needs_rows = !tests && !keeps;
+    if ((result.status = rows.load(candidate, needs_rows)) != Status::success ||
+        (result.status = rows.value(candidate.t, needs_rows)) != Status::success)
       return result;
     result.drift_before = drift;
+    if (keeps && !tests) ++age;
     if (tests) {
       if (clearly_needs_no_move()) {
         result.not_needed = true;
         run_.length = 0.0;
         return result;
       }
-      if ((result.status = rows.value(candidate.t, true)) != Status::success) return result;
+      if (!keeps && (result.status = rows.value(candidate.t, true)) != Status::success)
+        return result;
     }
-    iterate(candidate, result);
+    iterate(candidate, keeps, result);
     const bool nothing = result.status == Status::success && result.length <= kNothing;
     run_.nothing_in_row = nothing ? run_.nothing_in_row + 1 : 0;
     if (result.status != Status::success) {
@@ -102,38 +106,45 @@ class Newton : public RowsAt {
   }
 
   // By factors of a point `reach` tolerances away. Where no move was needed they may be those of an
-  // earlier candidate: what is left is too short then to show a rate.
+  // earlier candidate: what is left is too short then to show a rate. Rows that leave no choice are
+  // settled by these, too, as long as moves shrink as they did before.
   Status settle(const Candidate& candidate, N_Vector change) final {
     Storage& rows = self();
     const double reach = run_.length + rows.follow(candidate, change);
     Curvature& curvature = run_.of_settles;
     const bool measures = curvature.due(reach, ++run_.settles);
+    const bool no_choice = rows.leaves_no_choice();
     bool stale = age > 0;
     double previous = 0.0;
     for (int k = 0; k < options_.advanced.maximum_iterations; ++k) {
       Status status = rows.value(candidate.t, false);
       if (status != Status::success) return status;
       Solution found = rows.solve(Solve::rest);
-      if (stale && found.length > kNothing) {
+      const bool shrinks = no_choice && (k == 0 || found.length <= kShrinks * previous);
+      if (stale && found.length > kNothing && !shrinks) {
         if ((status = rows.factor(candidate.t, true)) != Status::success) return status;
         stale = false;
         found = rows.solve(Solve::first);
       }
       if (found.status != Status::success) return found.status;
       if ((status = rows.apply(1.0, candidate)) != Status::success) return status;
-      if (stale || kind == Kind::projection) break;
       const double length = found.length;
-      const bool enough_done =
-          (k > 0 || !measures) && curvature.left(reach, length) <= options_.advanced.tolerance;
+      if ((stale && length <= kNothing) || kind == Kind::projection) break;
+      const double left = stale ? run_.rate * length : curvature.left(reach, length);
+      const bool enough_done = (k > 0 || stale || !measures) && left <= options_.advanced.tolerance;
       if (k == 0 && enough_done) break;
       const bool rounding =
           length <= 1e2 * rounding_of(candidate) || (k > 0 && length > 0.5 * previous);
-      if (k > 0) curvature.measured(reach, previous, rounding ? 0.0 : length);
+      if (k > 0 && !stale) curvature.measured(reach, previous, rounding ? 0.0 : length);
       if (rounding || enough_done) break;
       previous = length;
     }
     return Status::success;
   }
+
+  /// Whether these rows determine as many unknowns as they are, so that any metric gives the same
+  /// move. Storages that can tell hide this one.
+  bool leaves_no_choice() const { return false; }
 
   double remaining_drift(const Candidate& candidate) final {
     if (kind == Kind::projection) return -1.0;
@@ -148,6 +159,7 @@ class Newton : public RowsAt {
  private:
   static constexpr double kLargestFloor = 0.1;  // tolerances
   static constexpr int kUnneededMoves = 8;      // moves below kNothing in a row, then tests begin
+  static constexpr double kShrinks = 0.1;  // of a move: earlier factors that leave more are renewed
 
   enum class Verdict { done, go_on, refactor, failed };
   // From a new run on.
@@ -155,6 +167,7 @@ class Newton : public RowsAt {
     Curvature of_moves, of_settles;
     long candidates = 0, settles = 0;
     double length = 0.0;     // of the last first move, in tolerances
+    double rate = 1.0;       // ratio of the last two moves by factors of an earlier candidate
     int nothing_in_row = 0;  // moves that were none
   };
 
@@ -178,12 +191,13 @@ class Newton : public RowsAt {
     return self().is_rounding() || kStaleSafety * self().solve(Solve::test).length <= kNothing;
   }
 
-  // Newton's method from the candidate, with g known there.
-  void iterate(const Candidate& candidate, Move& result) {
+  // Newton's method from the candidate, with g known there. `keeps`: it begins with the factors of
+  // an earlier candidate, so that age > 0.
+  void iterate(const Candidate& candidate, bool keeps, Move& result) {
     Storage& rows = self();
     ++run_.candidates;
     double previous = -1.0;
-    Verdict verdict = Verdict::refactor;
+    Verdict verdict = keeps ? Verdict::go_on : Verdict::refactor;
     for (;;) {
       const bool fresh = verdict == Verdict::refactor;  // the factors belong to the present y
       if (fresh &&
@@ -230,7 +244,7 @@ class Newton : public RowsAt {
 
   // Newton's second move has the length kappa d^2, about.
   bool leaves_little(double length) const {
-    return !run_.of_moves.due(length, run_.candidates) &&
+    return age == 0 && !run_.of_moves.due(length, run_.candidates) &&
            run_.of_moves.left(length, length) <= options_.advanced.tolerance;
   }
 
@@ -246,11 +260,12 @@ class Newton : public RowsAt {
       return Verdict::go_on;
     }
     // A second move within rounding says nothing about curvature.
-    if (made.moves == 2)
+    if (made.moves == 2 && age == 0)
       run_.of_moves.measured(previous, previous, length > 10.0 * floor ? length : 0.0);
     // The rest is at most about length * ratio, and no more than length while ratio <= 1/2.
     const double ratio = length / previous;
-    if (ratio <= 0.5) {
+    if (age > 0) run_.rate = ratio;
+    if (ratio <= (age > 0 ? kShrinks : 0.5)) {
       if (length * ratio <= tolerance) return Verdict::done;
       return last ? Verdict::failed : Verdict::go_on;
     }

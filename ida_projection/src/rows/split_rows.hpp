@@ -187,6 +187,8 @@ class SplitRows {
       solve_blocks(g);
   }
   bool drops_rows() const;
+  /// Whether, if none is dropped, they determine as many algebraic variables, and nothing else.
+  bool leave_no_choice() const { return d.rows.empty() && a.rows.size() == a.columns.size(); }
   /// Whether inspect() has nothing to look for.
   bool keeps_blocks() const { return watched_.empty() && mixed_.empty(); }
   /// dy of every column that moves.
