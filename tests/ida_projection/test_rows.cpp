@@ -43,8 +43,7 @@ TEST_CASE("a thin row counts while it is twice as independent as C turns over th
   REQUIRE(tp::RowTrust::has_thin_rows(solver));
   REQUIRE(tp::RowTrust::firm_rows(solver) == 2);
   tp::RowTrust trust;
-  CHECK(trust.trusted_rows(solver, 1.0) == 2);   // nothing is known yet
-  CHECK(trust.trusted_rows(solver, 1e-6) == 3);  // too short to matter
+  CHECK(trust.trusted_rows(solver, 1e-6) == 2);  // nothing is known yet
   teach(&trust, &solver, 1e-3, 1.0);             // kappa = 1e-3: 2 kappa |dy| = 1e-4 at 0.05
   CHECK(trust.trusted_rows(solver, 0.048) == 3);
   CHECK(trust.trusted_rows(solver, 0.052) == 2);
@@ -54,11 +53,10 @@ TEST_CASE("a thin row counts while it is twice as independent as C turns over th
 TEST_CASE("how C turns is looked at again: after longer moves, and every 64th time") {
   MinimumNorm solver = two_near_and_one(1e-4);
   tp::RowTrust trust;
-  CHECK(trust.must_learn(0.01));
-  CHECK_FALSE(trust.must_learn(1e-4));
+  CHECK(trust.must_learn());
   REQUIRE(trust.wants_to_learn(0.01));
   teach(&trust, &solver, 1e-5, 0.01);
-  CHECK_FALSE(trust.must_learn(0.01));
+  CHECK_FALSE(trust.must_learn());
   CHECK_FALSE(trust.wants_to_learn(0.03));
   CHECK(trust.wants_to_learn(0.05));
   CHECK_FALSE(trust.wants_to_learn(1e-4));

@@ -85,7 +85,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     found.length = length_of_solution();
     if (how == Solve::first && thin_) {
       found.length = judge_thin_rows(found.length);
-      if (!moved_ && rows_.trust.must_learn(found.length)) {
+      if (!moved_ && rows_.trust.must_learn()) {
         // The move of the firm rows shows how C turns. Then all rows are judged at the start of the
         // move.
         rows_.for_moves([this](int j, double move) { y_[static_cast<std::size_t>(j)] -= move; });

@@ -38,15 +38,13 @@ class RowTrust {
   }
   /// Number of rows that take part for a move of this length (tolerances) of the firm rows.
   int trusted_rows(const Solver& solver, double length) const {
-    if (kappa_ < 0.0) return rows_from(solver, length > kShort ? kThin : 0.0);
-    return rows_from(solver, std::min(kThin, kSafety * kappa_ * length));
+    return rows_from(solver, kappa_ < 0.0 ? kThin : std::min(kThin, kSafety * kappa_ * length));
   }
 
-  /// Whether C must be evaluated after a move of this length before thin rows can be judged.
-  bool must_learn(double length) const { return kappa_ < 0.0 && length > kShort; }
+  /// Whether C must be evaluated after a move before thin rows can be judged.
+  bool must_learn() const { return kappa_ < 0.0; }
   /// Whether the turn of C over a move of this length is to be measured.
   bool wants_to_learn(double length) {
-    if (!(length > kShort)) return false;
     return kappa_ < 0.0 || length > 4.0 * measured_ || ++candidates_ % kMeasureEvery == 0;
   }
   /// From C (row-major, n columns) before and after the move; rows, columns: those in the solver.
@@ -75,7 +73,6 @@ class RowTrust {
  private:
   static constexpr double kSafety = 2.0;
   static constexpr double kDependent = 1e-5;
-  static constexpr double kShort = 1e-3;  // tolerances: over less than that C does not turn visibly
 
   static int rows_from(const Solver& solver, double smallest) {
     int rank = solver.rank();
