@@ -90,19 +90,19 @@ void Evaluator::flatten(const Constraints& set) {
 }
 
 template <class Fill>
-int Evaluator::write_checked(const Part& part, int n, double* g, double* C, Fill&& fill) {
-  const std::ptrdiff_t count = part.set->count, entries = part.entries(n);
-  double* const to =
-      g != nullptr ? g_room_.begin(count, std::max<std::ptrdiff_t>(count, n)) : nullptr;
-  const bool checks_C = C != nullptr && !part.C_checked;
-  double* const into = checks_C ? C_room_.begin(entries, entries + n) : C;
-  if (g != nullptr) std::copy(g, g + count, to);
-  if (checks_C) std::copy(C, C + entries, into);
-  const int flag = fill(to, into);
-  const bool within =
-      (g == nullptr || g_room_.end(g, count)) & (!checks_C || C_room_.end(C, entries));
-  part.C_checked |= checks_C;
-  return within ? flag : kOverran;
+int Evaluator::write_to_room(const Part& part, int n, double* g, double* C, Fill&& fill) {
+  const int count = part.set->count;
+  return g_room_.written(g, count, std::max(count, n), [&](double* to) { return fill(to, C); });
+}
+
+template <class Fill>
+int Evaluator::write_first_C(const Part& part, int n, double* g, double* C, Fill&& fill) {
+  const std::ptrdiff_t entries = part.entries(n);
+  const int flag = C_room_.written(C, entries, entries + n, [&](double* into) {
+    return g != nullptr ? write_to_room(part, n, g, into, fill) : fill(g, into);
+  });
+  part.C_checked = true;
+  return flag;
 }
 
 inline int Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <string>
@@ -31,33 +32,48 @@ std::string wrong_length(const Constraints& set, long unknowns);
 
 bool all_finite(const double* a, std::size_t n);
 
-/// Memory behind the results of a callback, which shows whether it writes too much.
-class GuardedRoom {
+/// Marks behind the results of a callback, which show whether it writes too much. They go with this
+/// object, and what stood there comes back.
+class Marks {
  public:
-  void reserve(std::ptrdiff_t count, std::ptrdiff_t more) {
-    const auto size = static_cast<std::size_t>(count + std::max(more, kLeast));
-    if (room_.size() < size) room_.resize(size);
+  static constexpr std::ptrdiff_t kCount = 4;
+
+  explicit Marks(double* behind) : behind_(behind) {
+    std::memcpy(kept_, behind_, sizeof kept_);
+    for (std::ptrdiff_t i = 0; i < kCount; ++i) behind_[i] = kUnwritten;
   }
-  /// Place for `count` values, as they were written last; `more`: how many too many do no harm.
-  double* begin(std::ptrdiff_t count, std::ptrdiff_t more) {
-    reserve(count, more);
-    for (std::ptrdiff_t i = 0; i < kChecked; ++i) behind(count)[i] = kUnwritten;
-    return room_.data();
-  }
-  /// Copies them; false: more were written.
-  bool end(double* values, std::ptrdiff_t count) {
-    if (room_.empty()) return true;  // there was no memory for it
-    for (std::ptrdiff_t i = 0; i < count; ++i) values[i] = room_[static_cast<std::size_t>(i)];
-    bool unwritten = true;
-    for (std::ptrdiff_t i = 0; i < kChecked; ++i)
-      unwritten = unwritten && behind(count)[i] == kUnwritten;
-    return unwritten;
+  ~Marks() { std::memcpy(behind_, kept_, sizeof kept_); }
+  Marks(const Marks&) = delete;
+  Marks& operator=(const Marks&) = delete;
+  bool untouched() const {
+    bool same = true;
+    for (std::ptrdiff_t i = 0; i < kCount; ++i) same &= behind_[i] == kUnwritten;
+    return same;
   }
 
  private:
   static constexpr double kUnwritten = 3.0517578125e-300;  // unlikely in g
-  static constexpr std::ptrdiff_t kLeast = 64, kChecked = 4;
-  double* behind(std::ptrdiff_t count) { return room_.data() + count; }
+  double* behind_;
+  double kept_[kCount];
+};
+
+/// Memory for the results of a callback and for what it writes too much.
+class GuardedRoom {
+ public:
+  /// Size of the memory for `count` values; `more`: how many too many do no harm.
+  static std::size_t size(std::ptrdiff_t count, std::ptrdiff_t more) {
+    return static_cast<std::size_t>(count + std::max(more, kLeast));
+  }
+  void reserve(std::ptrdiff_t count, std::ptrdiff_t more) {
+    if (room_.size() < size(count, more)) room_.resize(size(count, more));
+  }
+  /// call(to) writes `count` values, which are copied to `values`; `to` has these at first. Returns
+  /// its flag, or that it has written more.
+  template <class Call>
+  int written(double* values, std::ptrdiff_t count, std::ptrdiff_t more, Call&& call);
+
+ private:
+  static constexpr std::ptrdiff_t kLeast = 64;
   std::vector<double> room_;
 };
 
@@ -65,6 +81,16 @@ constexpr int kOverran = std::numeric_limits<int>::min();  ///< flag of a callba
 constexpr double kInvolved = 1e-3;  ///< of a kept row in a dropped one, to be named beside it
 /// Tolerances beyond the kept rows: a dropped one that asks for more contradicts them.
 constexpr double kContradicts = 0.5;
+
+template <class Call>
+int GuardedRoom::written(double* values, std::ptrdiff_t count, std::ptrdiff_t more, Call&& call) {
+  reserve(count, more);
+  std::copy(values, values + count, room_.data());
+  const Marks marks(room_.data() + count);
+  const int flag = call(room_.data());
+  std::copy_n(room_.data(), count, values);
+  return marks.untouched() ? flag : kOverran;
+}
 
 /// The reason why rows did not succeed.
 struct RowsReport {
@@ -118,6 +144,13 @@ class Evaluator {
   /// So that value() on n unknowns never allocates.
   void reserve(int n) {
     for (const Part& part : parts_) g_room_.reserve(part.set->count, std::max(part.set->count, n));
+  }
+  /// Memory for g on n unknowns to which callbacks write directly: with room for what is too much.
+  std::vector<double> make_room(int n) {
+    std::vector<double> g(GuardedRoom::size(rows_, std::max(rows_, n)), 0.0);
+    roomy_ = g.data();
+    roomy_end_ = roomy_ + rows_;
+    return g;
   }
   bool uses_differences() const { return uses_differences_; }
   /// Whether some rows have a function that gives g and C together.
@@ -184,11 +217,17 @@ class Evaluator {
   /// what it writes too much, which ends the run.
   template <class Fill>
   int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
-    const bool known = g == nullptr && (C == nullptr || part.C_checked);
-    return known ? fill(g, C) : write_checked(part, n, g, C, std::forward<Fill>(fill));
+    if (C != nullptr && !part.C_checked) return write_first_C(part, n, g, C, fill);
+    if (g == nullptr) return fill(g, C);
+    if (g < roomy_ || g >= roomy_end_) return write_to_room(part, n, g, C, fill);
+    const Marks marks(g + part.set->count);
+    const int flag = fill(g, C);
+    return marks.untouched() ? flag : kOverran;
   }
   template <class Fill>
-  int write_checked(const Part& part, int n, double* g, double* C, Fill&& fill);
+  int write_to_room(const Part& part, int n, double* g, double* C, Fill&& fill);
+  template <class Fill>
+  int write_first_C(const Part& part, int n, double* g, double* C, Fill&& fill);
   /// call(part) for all sets, until one fails; `what` names the callback.
   template <class Call>
   Status each(const char*& what, Call&& call);
@@ -205,6 +244,7 @@ class Evaluator {
   Statistics& statistics_;
   std::vector<Part> parts_;
   GuardedRoom g_room_, C_room_;
+  double *roomy_ = nullptr, *roomy_end_ = nullptr;  // of make_room()
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string thrown_;
   int rows_ = 0, full_rows_ = 0;

@@ -182,9 +182,9 @@ class DistributedStore {
     load(y, y_);
     if (m_ > 0)
       call("Constraints::value", [&] {
-        const int flag = constraints_.value(t, ConstVector(y_.data(), n_ + ghosts_),
-                                            Vector(room_.begin(m_, m_), m_));
-        return room_.end(g_.data(), m_) ? flag : kOverran;
+        return room_.written(g_.data(), m_, m_, [&](double* to) {
+          return constraints_.value(t, ConstVector(y_.data(), n_ + ghosts_), Vector(to, m_));
+        });
       });
     double drift = 0.0;
     for (int i = 0; i < m_ && own_outcome_ == Status::success; ++i) {

@@ -36,7 +36,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
         reported_(static_cast<std::size_t>(reported >= 0 ? reported : evaluator_.rows())),
         inverse_n_(1.0 / size),
         y_(static_cast<std::size_t>(size), 0.0),
-        g_(static_cast<std::size_t>(evaluator_.rows()), 0.0),
+        g_(evaluator_.make_room(size)),
         kept_g_(g_) {}
 
   Status load(const Candidate& candidate, bool refills) override {
@@ -127,7 +127,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   bool leaves_no_choice() const { return rows_.leave_no_choice(); }
   bool is_rounding(double move = kAnyMove) override {
     if (std::isfinite(move)) return move <= rounding_length();
-    for (std::size_t i = 0; i < g_.size(); ++i)
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count()); ++i)
       if (!(std::abs(g_[i]) <= kRoundingOfTerms * rows_.C().terms(static_cast<int>(i), y_.data())))
         return false;
     return true;
@@ -406,7 +406,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     std::uint32_t random = 1;
     double squares = 0.0;
     for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
-      for (std::size_t i = 0; i < g_.size(); ++i) {
+      for (std::size_t i = 0; i < static_cast<std::size_t>(count()); ++i) {
         random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
         const double rounding = 8.0 * kEpsilon * rows_.C().terms(static_cast<int>(i), y_.data());
         kept_g_[i] = random >> 31 != 0 ? rounding : -rounding;

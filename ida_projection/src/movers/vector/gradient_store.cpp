@@ -35,11 +35,11 @@ Status GradientStore::value(double t, N_Vector y) {
   ++statistics_.value_evaluations;
   std::string thrown;
   for (const Part& part : parts_) {
-    double* const of_part = g.data() + part.first;
-    double* const to = room_.begin(part.count, part.count);
-    std::copy_n(of_part, part.count, to);
-    int flag = guarded([&] { return part.rows->value(t, y, to); }, thrown);
-    if (!room_.end(of_part, part.count)) flag = kOverran;
+    const auto write = [&] {
+      return room_.written(g.data() + part.first, part.count, part.count,
+                           [&](double* to) { return part.rows->value(t, y, to); });
+    };
+    const int flag = guarded(write, thrown);
     if (flag != 0) return report_.failed(flag, "Gradients::value", thrown, part.count);
   }
   for (int i = 0; i < rows.rows(); ++i)
