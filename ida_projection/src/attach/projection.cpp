@@ -179,11 +179,10 @@ void Projection::Impl::current_weights(N_Vector y) {
     N_VScale(1.0 / control_.weights_factor(), weights, weights);
     return;
   }
-  constexpr double kRelative = 1e6;  // 1 over the tolerance that is taken for the caller's
   N_VAbs(y, weights);
   N_VAddConst(weights, 1.0, weights);
   N_VInv(weights, weights);
-  N_VScale(kRelative, weights, weights);
+  N_VScale(1e6, weights, weights);  // of a tolerance of 1e-6
 }
 
 int Projection::Impl::solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret,

@@ -21,7 +21,7 @@ using linalg::at;
 // eigenvalues of H are.
 constexpr double kSolvedForBorder = 1e-11;
 constexpr double kDependent = 1e-5;  // of a full row: solutions with C leave less of it then
-constexpr int kMostSteps = 300, kPatience = 20;
+constexpr int kPatience = 20;
 
 // Outcomes by severity, so that the worst one is the largest.
 constexpr Status kOutcomes[] = {Status::success, Status::callback_recoverable, Status::not_finite,
@@ -374,7 +374,7 @@ class DistributedStore {
     const double first = size;
     double least = size;
     int since_least = 0;
-    for (int k = 0; k < kMostSteps && size > solved * solved * first; ++k) {
+    for (int k = 0; k < 300 && size > solved * solved * first; ++k) {
       project(p_, q_);
       const double curvature = N_VDotProd(p_, q_);
       if (!(curvature > 0.0)) break;

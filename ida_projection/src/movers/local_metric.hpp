@@ -66,10 +66,6 @@ class LocalMetric {
   }
 
  private:
-  // A component without a weight (WT = 0) has the corrector's change as its scale.
-  void use_weights(const double* w) {
-    for (std::size_t i = 0; i < D_.size(); ++i) D_[i] = w[i] > 0.0 ? 1.0 / w[i] : trial_scale_[i];
-  }
   // One scale for each group: rms of |correction| in tolerances over its members.
   void share(const double* w, const std::vector<int>& group) {
     const auto groups = static_cast<std::size_t>(1 + *std::max_element(group.begin(), group.end()));

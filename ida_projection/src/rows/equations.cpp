@@ -3,6 +3,7 @@
 #include "rows/equations.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <initializer_list>
@@ -213,13 +214,13 @@ static bool are_the_equations(Evaluator& rows, const Residual& residual,
                               const std::vector<double>& y, const std::vector<double>& WT) {
   const auto equations = std::count(derivative_free.begin(), derivative_free.end(), 1);
   if (equations != static_cast<std::ptrdiff_t>(which.size())) return false;
-  constexpr int kPoints = 3;
-  constexpr double kDirections[kPoints] = {2.9, 5.3, 8.1}, kSame = 1e-8;
+  constexpr std::array<double, 3> directions = {2.9, 5.3, 8.1};
+  constexpr double kSame = 1e-8;
   const std::vector<double> far = further_away(y, WT);
-  std::vector<double> point(y.size()), g[kPoints], f[kPoints];
-  for (int k = 0; k < kPoints; ++k) {
+  std::vector<double> point(y.size()), g[directions.size()], f[directions.size()];
+  for (std::size_t k = 0; k < directions.size(); ++k) {
     for (std::size_t j = 0; j < y.size(); ++j)
-      point[j] = y[j] + std::sin(1.0 + kDirections[k] * static_cast<double>(j)) * (far[j] - y[j]);
+      point[j] = y[j] + std::sin(1.0 + directions[k] * static_cast<double>(j)) * (far[j] - y[j]);
     g[k].resize(at(rows.rows()));
     f[k].resize(y.size());
     if (rows.value(t, point.data(), static_cast<int>(y.size()), g[k].data()) != Status::success ||
@@ -228,7 +229,7 @@ static bool are_the_equations(Evaluator& rows, const Residual& residual,
   }
   const auto proportional = [&](std::size_t i, std::size_t e) {
     bool same = g[0][i] != 0.0 && f[0][e] != 0.0;
-    for (int k = 1; k < kPoints; ++k) {
+    for (std::size_t k = 1; k < directions.size(); ++k) {
       const double a = g[k][i] * f[0][e], b = g[0][i] * f[k][e];
       same = same && std::abs(a - b) <= kSame * std::abs(a);
     }

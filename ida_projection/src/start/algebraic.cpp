@@ -17,10 +17,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-// The search for the index costs two dense Jacobians by differences. Beyond this number of unknowns
-// it is made only if IDA's own Jacobian is of that kind, too.
-constexpr int kLargestSize = 200;
-
 using Near = NearbyResiduals;
 
 }  // namespace

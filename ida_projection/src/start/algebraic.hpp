@@ -15,6 +15,8 @@ namespace tether::ida_projection {
 /// Up to this number of unknowns F is evaluated for each of them: two dense Jacobians of 2000
 /// unknowns take seconds.
 constexpr int kLargestProbed = 2000;
+/// Beyond this number a Jacobian is made by differences only if IDA's own is, too.
+constexpr int kLargestSize = 200;
 
 /// The id vector of IDA (1 differential, 0 algebraic), the caller's or derived from F, and whether
 /// F is of index 1 in its own variables. Candidates have their cj.

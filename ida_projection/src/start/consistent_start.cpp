@@ -233,9 +233,8 @@ bool ConsistentStart::move_algebraic_first(double t0, N_Vector start, N_Vector y
 // moves the point. The report has the length of the first projection and the last drift.
 void ConsistentStart::settle(double t0, N_Vector y, N_Vector ydot, const Consistency& how,
                              ConsistencyReport& report) {
-  constexpr int kRounds = 8;
   constexpr double kSettled = 1e-3;  // tolerances
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < 8; ++round) {
     const OwnedVector before = copy_of(y);
     bool jointly = false;
     ConsistencyReport now = project(t0, y, ydot, how, &jointly);

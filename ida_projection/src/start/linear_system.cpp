@@ -8,12 +8,6 @@
 
 namespace tether::ida_projection {
 
-namespace {
-
-constexpr int kHighestIndex = 4;
-
-}  // namespace
-
 std::vector<char> undetermined_columns(Eigen::MatrixXd a, bool scale_rows) {
   if (!a.allFinite()) return {};
   const auto scale = [](auto vectors) {
@@ -47,7 +41,7 @@ std::vector<char> undetermined_columns(Eigen::MatrixXd a, bool scale_rows) {
 int differential_index(Eigen::MatrixXd E, Eigen::MatrixXd A) {
   const Eigen::Index n = E.rows();
   linalg::PivotedQr qr(kProductRounding);
-  for (int index = 0; index <= kHighestIndex; ++index) {
+  for (int index = 0; index <= 4; ++index) {
     for (Eigen::Index i = 0; i < n; ++i) {
       const double size = E.row(i).lpNorm<Eigen::Infinity>();
       if (!(size > 0.0)) continue;

@@ -12,8 +12,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kMaximumIterations = 60;
-constexpr double kSmallestDamping = 1.0 / 1024.0;
 constexpr double kConverged = 1e-8;  // tolerances: quadratic convergence makes this round-off
 
 }  // namespace
@@ -62,7 +60,7 @@ Status PointProjection::arrange(const Candidate& point, const std::vector<bool>&
 // simplified next correction. False: there is none, and the point is back where it was.
 bool PointProjection::damped_step(const Candidate& point, double length, double floor,
                                   double* left) {
-  for (double s = 1.0; s >= kSmallestDamping; s *= 0.5) {
+  for (double s = 1.0; s >= 1.0 / 1024.0; s *= 0.5) {
     N_VLinearSum(1.0, from_, -s, dy_, point.correction);
     rows_->follow(point, nullptr);
     if (rows_->value(point.t, false) != Status::success) {
@@ -84,7 +82,7 @@ void PointProjection::newton(const Candidate& point, ConsistencyReport& report) 
   report.drift_before = rows_->drift;
   double previous = -1.0;
   int halvings_in_a_row = 0;
-  for (report.iterations = 0; report.iterations < kMaximumIterations; ++report.iterations) {
+  for (report.iterations = 0; report.iterations < 60; ++report.iterations) {
     report.status = rows_->factor(point.t, report.iterations == 0);
     if (report.status != Status::success) return;
     const Solution next = rows_->solve(Solve::point);

@@ -15,9 +15,8 @@ namespace {
 constexpr double kOffItsSet = 2.0;  // tolerances: F has moved a row so far off its set
 constexpr int kRefinements = 3;
 constexpr double kSettles = 0.01;   // change of the rate in the last of them, see diagnose()
-constexpr double kAgree = 0.5;      // difference of two rates in a row
+constexpr double kAgree = 0.5;      // share in which a second look confirms the first
 constexpr double kRounding = 1e-9;  // of the terms: differences of g know no less
-constexpr double kConfirmed = 0.5;  // of it, by a better y'
 constexpr int kSeen = 3;            // times, before a vanished row or a small solution is said
 constexpr double kMoves = 0.05;     // of y in a step: it is no state of rest
 constexpr double kGrows = 1.02;     // for each step: a solution from zero may be small at first
@@ -167,7 +166,7 @@ std::string FirstSteps::diagnose(int row, double noticed, const Corrected& at) {
       std::abs(along) > rounding && std::abs(along - before) <= kSettles * std::abs(along);
   if (settled) of.verified += along * of.span;
   const double earlier = std::exchange(of.suspected, 0.0);
-  if (settled && std::abs(of.verified) > kConfirmed * noticed) of.suspected = along;
+  if (settled && std::abs(of.verified) > kAgree * noticed) of.suspected = along;
   // At a singular position F determines no y', whatever the sum: the next check decides.
   if (std::abs(earlier - of.suspected) < kAgree * std::abs(of.suspected)) {
     run_.false_row_found = true;

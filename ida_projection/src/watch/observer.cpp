@@ -15,8 +15,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr std::size_t kMostNamed = 200;  // algebraic variables, each an evaluation of F
-
 // The candidate as the searches want it.
 struct Point {
   std::vector<double> y, WT;
@@ -92,7 +90,7 @@ std::string Observer::undetermined_multipliers(const Candidate& candidate, N_Vec
     change[j] = std::max(w > 0.0 ? WT[j] : 0.0, kWideIncrement * std::max(1.0, std::abs(at[j])));
     if (variables_.mask()[j] == 0.0) algebraic.push_back(static_cast<int>(j));
   }
-  if (algebraic.size() > kMostNamed) return {};
+  if (algebraic.size() > static_cast<std::size_t>(kLargestSize)) return {};
   NearbyResiduals near(candidate, corrector_, statistics_, std::move(change), y);
   Eigen::MatrixXd slopes(at.size(), algebraic.size());
   for (std::size_t k = 0; k < algebraic.size(); ++k)
