@@ -31,6 +31,7 @@ double careful_norm(const Eigen::Ref<const Eigen::RowVectorXd>& a) {
 // P A = L Q, or A A^T = L L^T of the rows that take part.
 struct MinimumNorm::Large {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  static constexpr int kBlock = 4;  // entries of a row, as many as Eigen adds up side by side
 
   // Modified Gram-Schmidt, of rows the one of which most is left first; A becomes Q. Returns the
   // rank: of the next row no more than `tolerance` is left.
@@ -47,18 +48,18 @@ struct MinimumNorm::Large {
       if (!(length > tolerance)) return k;
       L(k, k) = length;
       A.row(k) *= 1.0 / length;
-      for (int i = k + 1; i < m; ++i) {
-        take(i, k);
-        left[i] = A.row(i).squaredNorm();
-      }
+      for (int i = k + 1; i < m; ++i)
+        if (take(i, k)) left[i] = A.row(i).squaredNorm();
     }
     return m;
   }
-  // Removes from row i its part along row k of Q.
-  void take(int i, int k) {
+  // Removes from row i its part along row k of Q. False: it has none.
+  bool take(int i, int k) {
     const double share = A.row(k).dot(A.row(i));
+    if (share == 0.0) return false;
     L(i, k) += share;
     A.row(i) -= share * A.row(k);
+    return true;
   }
   void exchange(int i, int k, std::vector<int>& order) {
     if (i == k) return;
@@ -68,12 +69,37 @@ struct MinimumNorm::Large {
     std::swap(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(k)]);
   }
 
+  // Notes where row k of A has blocks that are not zero.
+  void note_filled(int k) {
+    const double* a = A.row(k).data();
+    int count = 0;
+    for (int e = 0; e + kBlock <= A.cols(); e += kBlock)
+      if (a[e] != 0.0 || a[e + 1] != 0.0 || a[e + 2] != 0.0 || a[e + 3] != 0.0)
+        filled(k, count++) = e;
+    filled_blocks[k] = count;
+  }
+  // Row i of A times row k, with the bits of Eigen's product: zeros of row i are left out.
+  double product(int i, int k) const {
+    const double *a = A.row(i).data(), *b = A.row(k).data();
+    double sum[kBlock] = {};
+    for (int f = 0; f < filled_blocks[i]; ++f)
+      for (int e = filled(i, f), l = 0; l < kBlock; ++l) sum[l] += a[e + l] * b[e + l];
+    double low = sum[0] + sum[2], high = sum[1] + sum[3];
+    Eigen::Index e = A.cols() / kBlock * kBlock;
+    for (; e + 1 < A.cols(); e += 2) {
+      low += a[e] * b[e];
+      high += a[e + 1] * b[e + 1];
+    }
+    return e < A.cols() ? low + high + a[e] * b[e] : low + high;
+  }
+
   // Returns the least L_kk of the first `rank` rows of A; 0 where A A^T is not positive definite.
   double factor(int rank) {
     double least = 1.0;
     for (int k = 0; k < rank; ++k) {
+      note_filled(k);
       for (int j = 0; j < k; ++j)
-        L(k, j) = (A.row(k).dot(A.row(j)) - L.row(k).head(j).dot(L.row(j).head(j))) / L(j, j);
+        L(k, j) = (product(j, k) - L.row(k).head(j).dot(L.row(j).head(j))) / L(j, j);
       const double square = A.row(k).squaredNorm() - L.row(k).head(k).squaredNorm();
       if (!(square > 0.0)) return 0.0;
       L(k, k) = std::sqrt(square);
@@ -92,6 +118,8 @@ struct MinimumNorm::Large {
   Rows A;  // unit rows, or those of Q; factored ones in pivot order
   Rows L;
   Eigen::VectorXd left, rhs;  // left: square of what is left of each row
+  Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> filled;  // note_filled()
+  Eigen::VectorXi filled_blocks;
 };
 
 MinimumNorm::MinimumNorm() : large_(std::make_unique<Large>()) {}
@@ -123,6 +151,8 @@ void MinimumNorm::resize(int rows, int columns) {
   large_->left.resize(rows);
   large_->rhs.resize(rows);
   large_->L.resize(rows, rows);
+  large_->filled.resize(rows, columns / Large::kBlock);
+  large_->filled_blocks.resize(rows);
   order_.resize(m);
   std::iota(order_.begin(), order_.end(), 0);
 }
