@@ -178,9 +178,10 @@ int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candida
                       moved > options_.advanced.largest_move &&
                       moved > kSudden * run_.accepted_move &&
                       rows_.used->factors == RowsAt::Factors::of_all_rows;
-  control_.choose_step(
-      attempt, candidate, polish_, moved, run_.suppressed ? variables_.tested() : nullptr,
-      run_.suppressed ? variables_.id() : nullptr, sudden ? polish_.corrected() : nullptr);
+  control_.choose_step(attempt, candidate, polish_, moved,
+                       run_.suppressed ? variables_.tested() : nullptr,
+                       run_.suppressed ? variables_.id() : nullptr,
+                       sudden ? polish_.corrected() : nullptr, rows_.used);
   history_.hand_over(attempt);
   return report_.succeed();
 }

@@ -159,6 +159,9 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     id_ = id;
     return structure(candidate.t, id);
   }
+  const std::vector<int>& solved_for() const override {
+    return rows_.a.rows.empty() ? RowsAt::solved_for() : rows_.a.columns;
+  }
   bool keeps_blocks() const override { return rows_.keeps_blocks(); }
   void accept() override { metric_.accept(); }
   void forget() {

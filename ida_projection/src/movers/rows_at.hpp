@@ -113,6 +113,11 @@ class RowsAt {
   virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
     return Status::success;
   }
+  /// Algebraic variables that rows are solved for, ascending.
+  virtual const std::vector<int>& solved_for() const {
+    static const std::vector<int> none;
+    return none;
+  }
   /// Whether no C that is evaluated later can ask for other blocks than set_algebraic() found.
   virtual bool keeps_blocks() const { return true; }
   /// The attempt that used the last candidate was accepted: its scale is kept.

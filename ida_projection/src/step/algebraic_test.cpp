@@ -5,6 +5,8 @@
 // polish leaves a part of that response, which differs from step to step. Where S is large this
 // part exceeds the tolerance at every step size.
 //
+// Variables that rows are solved for follow these, and leave nothing of that.
+//
 // ycor is a difference of order k + 1 of the history. Independent errors of size r contribute
 // r sqrt(C(2k+2, k+1)) to it, and the test multiplies it by about 1/(k+1). The tolerance grows by a
 // multiple of that contribution, and stays as it is where y_a does not respond.
@@ -36,6 +38,10 @@ constexpr double kAtOnce = 1e-6;
 // Accepted steps in a row after which the jump is passed. Before a jump at most five are accepted
 // in a row, as IDA cuts a rejected step to a quarter. The history reaches back by six.
 constexpr int kBeyond = 10;
+
+bool contains(const std::vector<int>& ascending, int j) {
+  return std::binary_search(ascending.begin(), ascending.end(), j);
+}
 
 double noise_in_test(int order) {
   double binomial = 1.0;
@@ -70,7 +76,8 @@ double AlgebraicTest::widened(const Variable& v, double weight, double y) const 
   return weight / (1.0 + weight * noise_ * error);
 }
 
-bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candidate, double move) {
+bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candidate, double move,
+                                  const std::vector<int>& solved) {
   detect_jump(attempt);
   const bool first = last_.h == 0.0;
   move_ = move;
@@ -82,6 +89,7 @@ bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candi
   double sum = 0.0;
   for (Variable& v : variables_) {
     if (attempt.accepted) v.response *= kMemory;
+    if (contains(solved, v.index)) v.response = 0.0;
     const double weight =
         widened(v, candidate.weight_entries[v.index], candidate.base_entries[v.index]);
     const double error = candidate.correction_entries[v.index] * weight;
@@ -90,18 +98,22 @@ bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candi
   const double error =
       std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights))) / (attempt.order + 1);
   last_ = {std::abs(attempt.h), error};
-  if (first) first_error_ = error;
+  if (first) first_ = last_;
   return error > doubled_;
 }
 
-bool AlgebraicTest::stay() const { return last_.error > kStays * first_error_; }
+bool AlgebraicTest::stay() const {
+  return last_.h < first_.h && last_.error > kStays * first_.error;
+}
 
-void AlgebraicTest::widen(const Candidate& candidate, const double* response) {
+void AlgebraicTest::widen(const Candidate& candidate, const double* response,
+                          const std::vector<int>& solved) {
   double* weights = N_VGetArrayPointer(candidate.weights);
   for (Variable& v : variables_) {
     const double y = candidate.base_entries[v.index];
     // A response within rounding says nothing of S.
-    if (response != nullptr && std::abs(response[v.index]) > kRounding * std::abs(y))
+    if (response != nullptr && !contains(solved, v.index) &&
+        std::abs(response[v.index]) > kRounding * std::abs(y))
       v.response = std::max(v.response, std::abs(response[v.index]) / move_);
     v.weight = weights[v.index];
     weights[v.index] = jump_ ? 0.0 : widened(v, v.weight, y);

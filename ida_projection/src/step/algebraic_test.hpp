@@ -15,13 +15,15 @@ class AlgebraicTest {
  public:
   void begin(const std::vector<int>& variables);
   bool acts() const { return !variables_.empty(); }
-  /// An attempt that will be handed over, and the length of its move. Returns whether these
-  /// variables keep IDA from doubling its step.
-  bool begin_attempt(const Attempt& attempt, const Candidate& candidate, double move);
+  /// An attempt that will be handed over, and the length of its move. `solved`: variables that rows
+  /// are solved for, ascending, which keep their tolerances. Returns whether these variables keep
+  /// IDA from doubling its step.
+  bool begin_attempt(const Attempt& attempt, const Candidate& candidate, double move,
+                     const std::vector<int>& solved);
   /// In the first step: whether their error has stayed although IDA has shortened the step.
   bool stay() const;
   /// Lowers the weights. `response`: change of y by which F responds to the move; null: not known.
-  void widen(const Candidate& candidate, const double* response);
+  void widen(const Candidate& candidate, const double* response, const std::vector<int>& solved);
   /// The weights before widen(), in another attempt at the same step: IDA computes them anew for a
   /// new step only.
   void restore(N_Vector weights) const;
@@ -35,20 +37,19 @@ class AlgebraicTest {
   double widened(const Variable& v, double weight, double y) const;
   void detect_jump(const Attempt& attempt);
 
-  // The last attempt, and the first refused one since many in a row were accepted. Errors are as
-  // IDA's test sees them; h = 0: there was none.
+  // The first attempt, the last one, and the first refused one since many in a row were accepted.
+  // Errors are as IDA's test sees them; h = 0: there was none.
   struct Tested {
     double h = 0.0, error = 0.0;
   };
   std::vector<Variable> variables_;
-  Tested last_, refused_;
+  Tested first_, last_, refused_;
   int order_ = 0;
   double move_ = 0.0;
   double noise_ = 0.0;    // at this order: multiple of independent errors
   double doubled_ = 0.0;  // the largest error with which IDA doubles h: twice it is 2^-(k+1)
-  double first_error_ = 0.0;
-  int accepted_ = 0;   // in a row
-  bool jump_ = false;  // the error stays in steps that are far shorter
+  int accepted_ = 0;      // in a row
+  bool jump_ = false;     // the error stays in steps that are far shorter
 };
 
 }  // namespace tether::ida_projection

@@ -40,11 +40,13 @@ void StepControl::suppress_others(N_Vector tested, const std::vector<int>& coupl
 }
 
 void StepControl::test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
-                                 double move) {
-  const bool limits = algebraic_test_.begin_attempt(attempt, candidate, move);
-  algebraic_test_.widen(candidate, limits && polish.iterations() > 0
-                                       ? polish.response(candidate, ida_.step().residual)
-                                       : nullptr);
+                                 double move, const std::vector<int>& solved) {
+  const bool limits = algebraic_test_.begin_attempt(attempt, candidate, move, solved);
+  algebraic_test_.widen(candidate,
+                        limits && polish.iterations() > 0
+                            ? polish.response(candidate, ida_.step().residual)
+                            : nullptr,
+                        solved);
 }
 
 void StepControl::apply(const Control& control) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "movers/rows_at.hpp"
 #include "step/algebraic_test.hpp"
 #include "step/ida_settings.hpp"
 #include "step/order_limit.hpp"
@@ -37,13 +38,14 @@ class StepControl {
   /// For an attempt that will be handed over, after a move of this length (infinity: it was not
   /// moved). The last polish followed the move. `tested`: the variables of IDA's error test,
   /// `differential`: those whose oscillations count (null: all); `unmoved`: the correction before a
-  /// sudden move (null: an ordinary one).
+  /// sudden move (null: an ordinary one); `rows`: those that were moved; null: there are none.
   void choose_step(const Attempt& attempt, const Candidate& candidate, Polish& polish, double move,
-                   N_Vector tested, N_Vector differential, N_Vector unmoved) {
+                   N_Vector tested, N_Vector differential, N_Vector unmoved, const RowsAt* rows) {
     // |ycor| decides the next step size, its ratio to the second difference the order.
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
-    if (engaged && algebraic_test_.acts()) test_algebraic(attempt, candidate, polish, move);
+    if (engaged && algebraic_test_.acts())
+      test_algebraic(attempt, candidate, polish, move, rows->solved_for());
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {
@@ -93,7 +95,7 @@ class StepControl {
 
   void restore(N_Vector weights, double factor) const;
   void test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
-                      double move);
+                      double move, const std::vector<int>& solved);
   void apply(const Control& control);
   void test_unmoved(const Attempt& attempt, double before, double after);
 
