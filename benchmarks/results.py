@@ -39,8 +39,8 @@ COMMANDS = {
                 "one. It compares Tether with the variant of IDA that has more digits: digits gained, evaluations of F and processor time "
                 "over IDA's. A cell of the last tables: significant digits of the worst component, steps, evaluations of F, processor "
                 "time in ms; \"limit\": beyond 30 s; more than 300000 steps fail. Digits are relative, and absolute tolerances are in the "
-                "unit of each component of the reference, at least 1e-4 of the problem's own. References: `examples/problems`. No NAND "
-                "gate of theirs: it lacks the capacities of the published one, which runs here.",
+                "unit of each component of the reference, at least 1e-4 of the problem's own. References: `examples/problems`; the NAND "
+                "gate is the published one.",
                 f"{BUILT}/accuracy/dae_set --repeats 1 --seconds 30 --svg benchmarks/results/dae_set"),
     "crossover": ("Where RADAU5's advantage on small smooth problems ends",
                   "A cell: processor time of Tether over that of RADAU5 (both, ms; evaluations of F of both). Below 1 Tether is faster; "
