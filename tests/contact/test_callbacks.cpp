@@ -227,3 +227,30 @@ TEST_CASE("a step that leaves the range of numbers is no success") {
   CHECK_FALSE(stepper.succeeded());
   CHECK(stepper.status() == tc::Status::unsolved);
 }
+
+TEST_CASE("joints that are refused leave a stepper without joints") {
+  struct Refused : tc::JointEquations {
+    int rows() const override { return 1; }
+    void values(const tc::BodySet&, double, double* g) override { g[0] = 0; }
+    void add_rows(const tc::BodySet&, double, tc::JointRows& r) override {
+      r.add(0);
+      r.on(7, Vector6d::Unit(0));
+    }
+    bool has_laws() const override { return true; }
+    void add_laws(const tc::BodySet&, double, tc::JointLaws& laws) override {
+      laws.add_limit(0, 0.1, 0.0);
+    }
+  };
+  Scene scene(5e-3);
+  scene.friction(0.5, 0.5);
+  scene.ground();
+  const int ball = scene.sphere(0.1, 1, {0, 0, 0.1}, {0, 0, -1});
+  tc::Stepper refused = scene.stepper(), plain = scene.stepper();
+  CHECK(thrown([&] { refused.add_joints(std::make_unique<Refused>()); }) ==
+        "joint 0: body = 7: must be one of 2");
+  for (tc::Stepper* s : {&refused, &plain}) {
+    s->start_anew(0, 0);
+    for (int k = 0; k < 50; ++k) s->step();
+  }
+  CHECK(position(refused, ball) == position(plain, ball));
+}

@@ -43,6 +43,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     place(candidate);
     if (!refills) metric_.find(at_);
     decided_ = moved_ = false;
+    solved_ = 0.0;
     return rows_.structured() ? Status::success : structure(candidate.t, nullptr);
   }
   Status value(double t, bool with_rows) override {
@@ -83,6 +84,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     }
     if (how != Solve::test) ++statistics_.iterations;
     found.length = length_of_solution();
+    solved_ = std::max(solved_, length_of_solved());
     if (how == Solve::first && thin_) {
       found.length = judge_thin_rows(found.length);
       if (!moved_ && rows_.trust.must_learn()) {
@@ -124,6 +126,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     });
     return learns ? learn_trust(length_) : Status::success;
   }
+  double solved_length() const override { return solved_; }
   bool leaves_no_choice() const { return rows_.leave_no_choice(); }
   bool is_rounding(double move = kAnyMove) override {
     if (std::isfinite(move)) return move <= rounding_length();
@@ -160,7 +163,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     return structure(candidate.t, id);
   }
   const std::vector<int>& solved_for() const override {
-    return rows_.a.rows.empty() ? RowsAt::solved_for() : rows_.a.columns;
+    return rows_.d.rows.empty() ? rows_.a.columns : RowsAt::solved_for();
   }
   bool keeps_blocks() const override { return rows_.keeps_blocks(); }
   void accept() override { metric_.accept(); }
@@ -319,10 +322,22 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
     return Status::success;
   }
-  // Variables of index 1 that rows are solved for count as well: IDA's error test sees them.
   double length_of_solution() {
     double sum = 0.0;
-    rows_.for_moves([&sum, w = at_.weight_entries](int i, double dy) { sum += square(dy * w[i]); });
+    const Block& block = rows_.counted();
+    block.for_columns([&sum, dy = block.dy.data(), w = at_.weight_entries](int k, int i) {
+      const double move = dy[k] * w[i];
+      sum += move * move;
+    });
+    return wrms(sum);
+  }
+  // The same of the algebraic variables that rows are solved for, beside others.
+  double length_of_solved() const {
+    double sum = 0.0;
+    if (!rows_.d.rows.empty() && !rows_.a.rows.empty())
+      rows_.a.for_columns([&sum, dy = rows_.a.dy.data(), w = at_.weight_entries](int k, int j) {
+        sum += square(dy[k] * w[j]);
+      });
     return wrms(sum);
   }
   double length_with(int rank) {
@@ -439,6 +454,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   std::vector<double> y_, WT_, g_;
   std::vector<double> kept_g_, shifted_;  // work space
   double t_ = 0.0, length_ = 0.0;         // of the last evaluation and solution
+  double solved_ = 0.0;                   // the longest length_of_solved() of this candidate
   bool rows_known_ = false;               // C belongs to the present y
   bool thin_ = false;                     // some of the factored rows need RowTrust
   bool lasting_ = false;                  // the choice of rows is right for the next steps, too

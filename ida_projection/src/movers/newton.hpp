@@ -188,7 +188,9 @@ class Newton : public RowsAt {
   // constraints IDA keeps by itself g is rounding in every step, and evaluating g alone suffices.
   bool clearly_needs_no_move() {
     ++age;
-    return self().is_rounding() || kStaleSafety * self().solve(Solve::test).length <= kNothing;
+    return self().is_rounding() ||
+           kStaleSafety * std::max(self().solve(Solve::test).length, self().solved_length()) <=
+               kNothing;
   }
 
   // Newton's method from the candidate, with g known there. `keeps`: it begins with the factors of

@@ -37,7 +37,7 @@ struct Move {
 /// The move dy for the present g by the current factors.
 struct Solution {
   Status status = Status::success;
-  double length = 0.0;  ///< WRMS over all variables that move, in tolerances
+  double length = 0.0;  ///< WRMS over the variables of the error test, in tolerances
   double left = 0.0;    ///< part of the move that an iterative solution has left
   int rank = 0;         ///< of Solve::point: rows that take part, if that is known
 };
@@ -113,11 +113,14 @@ class RowsAt {
   virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
     return Status::success;
   }
-  /// Algebraic variables that rows are solved for, ascending.
+  /// Algebraic variables that rows are solved for, ascending; none where other rows move others, to
+  /// which they respond.
   virtual const std::vector<int>& solved_for() const {
     static const std::vector<int> none;
     return none;
   }
+  /// Of the candidate's moves: length over algebraic variables that `Solution::length` leaves out.
+  virtual double solved_length() const { return 0.0; }
   /// Whether no C that is evaluated later can ask for other blocks than set_algebraic() found.
   virtual bool keeps_blocks() const { return true; }
   /// The attempt that used the last candidate was accepted: its scale is kept.

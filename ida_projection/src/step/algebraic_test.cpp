@@ -5,7 +5,8 @@
 // polish leaves a part of that response, which differs from step to step. Where S is large this
 // part exceeds the tolerance at every step size.
 //
-// Variables that rows are solved for follow these, and leave nothing of that.
+// Variables that rows are solved for follow these, and leave nothing of that where nothing else
+// moves.
 //
 // ycor is a difference of order k + 1 of the history. Independent errors of size r contribute
 // r sqrt(C(2k+2, k+1)) to it, and the test multiplies it by about 1/(k+1). The tolerance grows by a

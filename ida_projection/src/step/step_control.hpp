@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/mechanisms.hpp"
 #include "movers/rows_at.hpp"
 #include "step/algebraic_test.hpp"
 #include "step/ida_settings.hpp"
@@ -44,8 +45,9 @@ class StepControl {
     // |ycor| decides the next step size, its ratio to the second difference the order.
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
-    if (engaged && algebraic_test_.acts())
-      test_algebraic(attempt, candidate, polish, move, rows->solved_for());
+    if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance))
+      test_algebraic(attempt, candidate, polish, std::hypot(move, rows->solved_length()),
+                     rows->solved_for());
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {

@@ -322,8 +322,15 @@ void Stepper::add_joints(std::unique_ptr<JointEquations> joints) {
   if (joints->has_laws() && s.options.restitution_law != RestitutionLaw::newton)
     throw std::invalid_argument(
         "Stepper::add_joints: limits, motors and friction of joints need restitution_law = newton");
-  s.add_joints(std::make_unique<detail::StepJoints>(std::move(joints), s.bodies,
-                                                    s.options.gyroscopic, s.cones));
+  try {
+    s.add_joints(std::make_unique<detail::StepJoints>(std::move(joints), s.bodies,
+                                                      s.options.gyroscopic, s.cones));
+  } catch (...) {  // the stepper goes on without them
+    s.cones.laws.reset();
+    s.cones.links.clear();
+    s.cones.mechanisms = {};
+    throw;
+  }
 }
 
 }  // namespace tether::contact
