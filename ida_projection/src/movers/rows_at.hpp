@@ -119,7 +119,7 @@ class RowsAt {
     static const std::vector<int> none;
     return none;
   }
-  /// Of the candidate's moves: length over algebraic variables that `Solution::length` leaves out.
+  /// Length of the moves so far over algebraic variables that `Solution::length` leaves out.
   virtual double solved_length() const { return 0.0; }
   /// Whether no C that is evaluated later can ask for other blocks than set_algebraic() found.
   virtual bool keeps_blocks() const { return true; }
