@@ -15,7 +15,7 @@ namespace {
 constexpr double kOffItsSet = 2.0;  // tolerances: F has moved a row so far off its set
 constexpr int kRefinements = 3;
 constexpr double kSettles = 0.01;   // change of the rate in the last of them, see diagnose()
-constexpr double kAgree = 0.5;      // share in which a second look confirms the first
+constexpr double kAgree = 0.5;      // of what is noticed, to confirm it; of a rate, its next change
 constexpr double kRounding = 1e-9;  // of the terms: differences of g know no less
 constexpr int kSeen = 3;            // times, before a vanished row or a small solution is said
 constexpr double kMoves = 0.05;     // of y in a step: it is no state of rest
