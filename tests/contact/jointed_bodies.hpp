@@ -123,10 +123,8 @@ struct Mechanism {
     std::vector<tc::detail::BodyCone> cones;
     for (const tc::ContactRows& c : contacts) {
       tc::detail::BodyCone& to = cones.emplace_back(tc::Cone::friction(c.mu));
-      to.first = c.first;
-      to.second = c.second;
-      to.J1 = c.J1;
-      to.J2 = c.J2;
+      to.terms.push_back({c.first, c.J1});
+      if (c.second >= 0) to.terms.push_back({c.second, c.J2});
       to.bias = c.bias;
     }
     out.contacts =

@@ -54,9 +54,9 @@ tc::detail::BodyCones::Result solve(const std::vector<tc::RigidBody>& bodies, do
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const tc::detail::BodyCone& c = cones[k];
     const int moments = c.cone.rows - 3;
-    contacts[k].impulse = c.J1.topLeftCorner(3, 3).transpose() * x.segment<3>(rows);
-    contacts[k].moment =
-        c.J1.bottomRightCorner(moments, 3).transpose() * x.segment(rows + 3, moments);
+    const tc::detail::BodyCone::Rows& J = c.terms.front().J;
+    contacts[k].impulse = J.topLeftCorner(3, 3).transpose() * x.segment<3>(rows);
+    contacts[k].moment = J.bottomRightCorner(moments, 3).transpose() * x.segment(rows + 3, moments);
     rows += c.cone.rows;
   }
   return out;

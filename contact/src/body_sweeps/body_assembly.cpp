@@ -10,19 +10,15 @@ namespace tether::contact {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-namespace {
-
-Options solver_options(const BodyOptions& options, double work) {
+Options detail::assembled_options(const BodyOptions& options) {
   Options o;
   o.law = options.law;
-  o.tolerance = 0.9 * options.tolerance;  // the two forms round differently
+  o.tolerance = options.tolerance;
   o.strict = options.strict;
-  o.max_work = work;
+  o.max_work = options.max_work;
   o.enough = options.enough;
   return o;
 }
-
-}  // namespace
 
 // The island as a Problem, for the stages of Solver; x: its present impulses.
 Problem BodySolver::Implementation::assembled(const Island& island, Worker& worker,
@@ -67,7 +63,10 @@ void BodySolver::Implementation::assemble(int k, Worker& worker) {
   IslandResult& r = results[at(k)];
   Eigen::VectorXd x;
   const Problem problem = assembled(island, worker, x);
-  worker.solver = std::make_unique<Solver>(solver_options(options, r.assembly));
+  Options of_problem = detail::assembled_options(options);
+  of_problem.tolerance *= 0.9;  // the two forms round differently
+  of_problem.max_work = r.assembly;
+  worker.solver = std::make_unique<Solver>(of_problem);
   worker.solution = worker.solver->solve(problem, x);
   r.spent += r.assembly;
   r.status = worker.solution.status;

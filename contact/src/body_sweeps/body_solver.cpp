@@ -188,11 +188,8 @@ void BodySolver::scale_warm_start(double factor) {
 }
 void BodySolver::take_back() { implementation_->memory.take_back(); }
 void BodySolver::forget() { implementation_->memory.forget(); }
-WarmStart BodySolver::warm_start() const {
-  WarmStart start;
-  implementation_->memory.get(start);
-  return start;
-}
+WarmStart BodySolver::warm_start() const { return implementation_->memory.last(); }
+
 void BodySolver::set_warm_start(const WarmStart& start) {
   if (start.ids.size() != start.impulses.size())
     throw std::invalid_argument("warm start: " + std::to_string(start.ids.size()) + " ids, but " +

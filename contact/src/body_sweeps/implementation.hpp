@@ -22,6 +22,9 @@
 
 namespace tether::contact::detail {
 
+// The same for an assembled problem.
+Options assembled_options(const BodyOptions& options);
+
 // Data of one thread.
 struct Worker {
   PassScratch scratch;
@@ -125,9 +128,9 @@ struct BodySolver::Implementation {
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
   BodyOptions options;
-  detail::GivenProblem given;     // the caller's bodies and contacts
-  detail::ContactGraph graph;     // their islands
-  detail::ImpulseHistory memory;  // impulses of earlier solves
+  detail::GivenProblem given;    // the caller's bodies and contacts
+  detail::ContactGraph graph;    // their islands
+  detail::ImpulseMemory memory;  // impulses of earlier solves
   // Impulses of each contact in the memory; empty: none.
   std::vector<const Vector3d*> starts;
   detail::IslandSweeps sweeps;                // impulses and velocities of this solve

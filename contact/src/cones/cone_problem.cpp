@@ -46,20 +46,6 @@ void check(int k, const Cone& cone) {
                     "must be finite and >= 0");
 }
 
-void check_entries(const char* matrix, const std::vector<MatrixEntry>& entries, Eigen::Index rows,
-                   Eigen::Index columns) {
-  const auto place = [&](const MatrixEntry& e) {
-    return std::string(matrix) + "(" + std::to_string(e.row) + ", " + std::to_string(e.column) +
-           ")";
-  };
-  for (const MatrixEntry& e : entries) {
-    if (e.row < 0 || e.row >= rows || e.column < 0 || e.column >= columns)
-      fail(place(e) + " is outside of a matrix of " + std::to_string(rows) + " x " +
-           std::to_string(columns));
-    if (!std::isfinite(e.value)) detail::refuse(place(e), e.value, "must be finite");
-  }
-}
-
 // Sorts entries by row, then by column, and adds up those of equal position.
 void compress(std::vector<MatrixEntry>& entries) {
   std::stable_sort(entries.begin(), entries.end(), [](const MatrixEntry& a, const MatrixEntry& b) {
@@ -131,6 +117,20 @@ std::vector<MassPart> mass_parts(const std::vector<MatrixEntry>& M,
 }  // namespace
 
 namespace detail {
+
+void check_entries(const char* matrix, const std::vector<MatrixEntry>& entries, Eigen::Index rows,
+                   Eigen::Index columns) {
+  const auto place = [&](const MatrixEntry& e) {
+    return std::string(matrix) + "(" + std::to_string(e.row) + ", " + std::to_string(e.column) +
+           ")";
+  };
+  for (const MatrixEntry& e : entries) {
+    if (e.row < 0 || e.row >= rows || e.column < 0 || e.column >= columns)
+      fail(place(e) + " is outside of a matrix of " + std::to_string(rows) + " x " +
+           std::to_string(columns));
+    if (!std::isfinite(e.value)) refuse(place(e), e.value, "must be finite");
+  }
+}
 
 Matrix6d diagonal_block(const ConeProblem& problem, int row, int size) {
   Matrix6d D = Matrix6d::Zero();
@@ -223,7 +223,7 @@ ConeProblem ConeProblem::sparse(const std::vector<MatrixEntry>& A, const linalg:
   if (rows != n) detail::refuse_size("b", n, rows, "as many as the cones have rows");
   if (compliance.size() != 0 && compliance.size() != n)
     detail::refuse_size("compliance", compliance.size(), n, "one for each row, or none");
-  check_entries("A", A, n, n);
+  detail::check_entries("A", A, n, n);
   out.entries_ = A;
   for (Eigen::Index r = 0; r < compliance.size(); ++r) {
     detail::require(std::isfinite(compliance[r]) && compliance[r] >= 0, "compliance", compliance[r],
@@ -231,7 +231,7 @@ ConeProblem ConeProblem::sparse(const std::vector<MatrixEntry>& A, const linalg:
     out.entries_.push_back({static_cast<int>(r), static_cast<int>(r), compliance[r]});
   }
   compress(out.entries_);
-  check_entries("A", out.entries_, n, n);  // a sum of finite entries may overflow
+  detail::check_entries("A", out.entries_, n, n);  // a sum of finite entries may overflow
   out.b_ = b;
   out.cones_ = std::move(cones);
   out.row_start_.assign(at(static_cast<int>(n) + 1), 0);
@@ -288,8 +288,8 @@ ConeProblem ConeProblem::saddle(const std::vector<MatrixEntry>& M,
   const int n = static_cast<int>(f.size()), m = static_cast<int>(bias.size());
   detail::require_finite("f", f);
   detail::require_finite("bias", bias);
-  check_entries("M", M, n, n);
-  check_entries("J", J, m, n);
+  detail::check_entries("M", M, n, n);
+  detail::check_entries("J", J, m, n);
   std::vector<int> place, row_place(at(m), -1);
   const std::vector<MassPart> parts = mass_parts(M, J, n, place);
   std::vector<MatrixEntry> A;

@@ -59,6 +59,9 @@ inline double bound_of(const Cone& cone, int from, double normal) {
                                  : cone.mu * normal;
 }
 
+/// Throws std::invalid_argument on entries outside of a matrix and on those that are not finite.
+void check_entries(const char* matrix, const std::vector<MatrixEntry>& entries, Eigen::Index rows,
+                   Eigen::Index columns);
 /// Diagonal block of A: `size` rows from `row`; the rest of the result is zero.
 Matrix6d diagonal_block(const ConeProblem& problem, int row, int size);
 

@@ -141,14 +141,7 @@ void detail::DerivativeParts::check(const ProblemDirection& direction) const {
        {std::pair("mu", &direction.mu), std::pair("rolling", &direction.rolling),
         std::pair("torsional", &direction.torsional), std::pair("bound", &direction.bound)})
     check_entries(name, *v, blocks, "one for each contact or cone");
-  for (const MatrixEntry& e : direction.A) {
-    const auto place = [&] {
-      return "A(" + std::to_string(e.row) + ", " + std::to_string(e.column) + ")";
-    };
-    if (e.row < 0 || e.row >= n || e.column < 0 || e.column >= n)
-      throw std::invalid_argument(place() + " is outside of the matrix");
-    if (!std::isfinite(e.value)) refuse(place(), e.value, "must be finite");
-  }
+  check_entries("A", direction.A, n, n);
 }
 
 const char* name(DerivativeStatus status) {

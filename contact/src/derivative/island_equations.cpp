@@ -34,9 +34,7 @@ class DenseFactors final : public EquationFactors {
     Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * n_, 3 * n_);
     for (int i = 0; i < n_; ++i)
       for (int k = e.starts[at(i)]; k < e.starts[at(i + 1)]; ++k)
-        for (int c = 0; c < 3; ++c)
-          for (int r = 0; r < 3; ++r)
-            M(3 * i + r, 3 * e.columns[at(k)] + c) = e.blocks[at(k)].column[4 * c + r];
+        M.block<3, 3>(3 * i, 3 * e.columns[at(k)]) = as_matrix(e.blocks[at(k)]);
     factors_.factor(M);
   }
   void solve(PackedVector* y) override { pack(factors_.solve(unpacked(y, n_)), y); }

@@ -201,13 +201,8 @@ void SolutionDerivative::judge_rank() {
   if (report_.rank == report_.unknowns) return;
   std::sort(report_.not_unique.begin(), report_.not_unique.end());
   report_.status = DerivativeStatus::minimum_norm;
-  const Problem& p = system_.problem();
-  for (int i = 0; i < n; ++i)
-    for (int k = p.row_start()[at(i)]; k < p.row_start()[at(i + 1)]; ++k) {
-      const double *A = p.blocks()[at(k)].column, *v = y[at(p.columns()[at(k)])].v;
-      for (int r = 0; r < 3; ++r)
-        moved[at(i)].v[r] += A[r] * v[0] + A[4 + r] * v[1] + A[8 + r] * v[2];
-    }
+  const Packed none(at(n));
+  system_.velocities(y.data(), none.data(), moved.data());
   for (int i = 0; i < n; ++i)
     for (double v : moved[at(i)].v) largest = std::max(largest, std::abs(v) / system_.weight(i));
   report_.velocities_unique = largest <= kSeen;

@@ -26,9 +26,7 @@ using linalg::at;
 template <class Part>
 BodyCone::Column sum(const BodyCone& c, const std::vector<Vector6d>& v, const Part& part) {
   BodyCone::Column w = part(c.bias);
-  if (c.first >= 0) w += part(c.J1) * part(v[at(c.first)]);
-  if (c.second >= 0) w += part(c.J2) * part(v[at(c.second)]);
-  for (const auto& [body, J] : c.others) w += part(J) * part(v[at(body)]);
+  for (const BodyCone::Term& t : c.terms) w += part(t.J) * part(v[at(t.body)]);
   return w;
 }
 BodyCone::Column speeds(const BodyCone& c, const std::vector<Vector6d>& v) {
@@ -107,14 +105,16 @@ BodyCone contact_cone(const PointContact& p, double rolling, double torsional) {
   const ContactRows point = ContactRows::at_point(p.first, p.second, p.r1, p.r2, p.normal, p.mu);
   const Eigen::Matrix3d frame = tangent_frame(p.normal);
   const ConeParts parts = parts_of(out.cone.kind);
-  out.first = p.first;
-  out.second = p.second;
-  out.J1.topRows<3>() = point.J1;
-  out.J2.topRows<3>() = point.J2;
-  if (spins) out.J1.block<1, 3>(parts.spin, 3) = frame.row(0);
-  if (rolls) out.J1.block<2, 3>(parts.rolling, 3) = frame.bottomRows<2>();
-  const Eigen::Index moments = out.cone.rows - 3;
-  if (p.second >= 0) out.J2.bottomRows(moments) = -out.J1.bottomRows(moments);
+  BodyCone::Rows J = BodyCone::Rows::Zero(out.cone.rows, 6);
+  J.topRows<3>() = point.J1;
+  if (spins) J.block<1, 3>(parts.spin, 3) = frame.row(0);
+  if (rolls) J.block<2, 3>(parts.rolling, 3) = frame.bottomRows<2>();
+  out.terms.push_back({p.first, J});
+  if (p.second >= 0) {
+    J = -J;
+    J.topRows<3>() = point.J2;
+    out.terms.push_back({p.second, J});
+  }
   out.bias.head<3>() = frame * p.slip;
   out.bias[0] += p.bias;
   return out;
@@ -125,39 +125,28 @@ void scale_tangents(const std::array<Eigen::Vector3d, 2>& tangents, const PointC
   const Eigen::Matrix3d frame = tangent_frame(p.normal);
   Eigen::Matrix2d turn;
   for (int k = 0; k < 2; ++k) turn.row(k) = frame.bottomRows<2>() * tangents[at(k)];
-  cone.J1.middleRows<2>(1) = (turn * cone.J1.middleRows<2>(1)).eval();
-  cone.J2.middleRows<2>(1) = (turn * cone.J2.middleRows<2>(1)).eval();
+  for (BodyCone::Term& t : cone.terms) t.J.middleRows<2>(1) = (turn * t.J.middleRows<2>(1)).eval();
   cone.bias.segment<2>(1) = (turn * cone.bias.segment<2>(1)).eval();
 }
 
 void BodyCones::find_islands(const Mechanisms& mechanisms, const std::vector<BodyCone>& cones) {
-  const int n = static_cast<int>(cones.size()), nodes = mechanisms.count() + mechanisms.bodies();
-  sets_.reset(nodes);
-  const auto moving = [&](int body) { return body >= 0 && mechanisms.moves(body); };
-  const auto mover = [&](const BodyCone& c) {
-    if (moving(c.first)) return c.first;
-    for (const auto& [body, J] : c.others)
-      if (moving(body)) return body;
-    return c.second;
-  };
-  const auto join = [&](const BodyCone& c, int body) {
-    if (moving(body)) sets_.join(node_of(mechanisms, mover(c)), node_of(mechanisms, body));
-  };
-  for (const BodyCone& c : cones) {
-    join(c, c.second);
-    for (const auto& other : c.others) join(c, other.first);
-  }
-  const auto root = [&](int i) { return sets_.root(node_of(mechanisms, mover(cones[at(i)]))); };
-  first_of_.assign(at(nodes), n);
-  for (int i = n - 1; i >= 0; --i) first_of_[at(root(i))] = i;
-  const auto island = [&](int i) { return first_of_[at(root(i))]; };
+  const int n = static_cast<int>(cones.size());
+  sets_.reset(n);
+  first_on_.assign(at(mechanisms.count() + mechanisms.bodies()), -1);
+  for (int i = 0; i < n; ++i)
+    for (const BodyCone::Term& t : cones[at(i)].terms) {
+      if (!mechanisms.moves(t.body)) continue;
+      int& first = first_on_[at(node_of(mechanisms, t.body))];
+      if (first < 0) first = i;
+      sets_.join(first, i);
+    }
   order_.resize(cones.size());
   std::iota(order_.begin(), order_.end(), 0);
   std::stable_sort(order_.begin(), order_.end(),
-                   [&](int i, int j) { return island(i) < island(j); });
+                   [&](int i, int j) { return sets_.root(i) < sets_.root(j); });
   start_.clear();
   for (int k = 0; k < n; ++k)
-    if (k == 0 || island(order_[at(k)]) != island(order_[at(k - 1)])) start_.push_back(k);
+    if (k == 0 || sets_.root(order_[at(k)]) != sets_.root(order_[at(k - 1)])) start_.push_back(k);
   start_.push_back(n);
 }
 
@@ -169,15 +158,12 @@ bool BodyCones::collect_sides(const Mechanisms& mechanisms, const std::vector<Bo
   for (std::size_t l = 0; l < members_.size(); ++l) {
     const BodyCone& c = cones[at(members_[l])];
     alone_.emplace_back(BodyCone::Column::Zero(c.cone.rows));
-    const auto add_side = [&](int body, const BodyCone::Rows& J) {
-      if (body < 0 || !mechanisms.moves(body)) return;
+    for (const auto& [body, J] : c.terms) {
+      if (!mechanisms.moves(body)) continue;
       const BodyCone::Rows H = J * mechanisms.root(body);
       sides_.push_back({static_cast<int>(l), body, node_of(mechanisms, body), H});
       alone_.back() += H.rowwise().squaredNorm();
-    };
-    add_side(c.first, c.J1);
-    add_side(c.second, c.J2);
-    for (const auto& [body, J] : c.others) add_side(body, J);
+    }
   }
   std::stable_sort(sides_.begin(), sides_.end(),
                    [](const Side& a, const Side& b) { return a.node < b.node; });

@@ -12,19 +12,19 @@
 
 namespace tether::contact::detail {
 
-/// One factor of the product, by its rows on its bodies: w = J1 v1 + J2 v2 + ... + bias
-/// + compliance x.
+/// One factor of the product, by its rows on its bodies: w = sum of J v + bias + compliance x.
 struct BodyCone {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 6, 6>;
   using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+  struct Term {
+    int body;
+    Rows J;
+  };
 
-  explicit BodyCone(const Cone& of)
-      : cone(of), J1(Rows::Zero(of.rows, 6)), J2(J1), bias(Column::Zero(of.rows)) {}
+  explicit BodyCone(const Cone& of) : cone(of), bias(Column::Zero(of.rows)) {}
 
   Cone cone;
-  int first = -1, second = -1;  ///< -1: the fixed world
-  Rows J1, J2;
-  std::vector<std::pair<int, Rows>> others;  ///< more bodies, of laws
+  std::vector<Term> terms;
   Column bias;
   double compliance = 0;  ///< velocity over impulse, of every row
 };
@@ -102,9 +102,10 @@ class BodyCones {
   Options options_;
   ConeSolver solver_;
   Result result_;
-  linalg::DisjointSets sets_;                  // of mechanisms and single bodies
-  std::vector<int> row_;                       // of each cone: its first row in x
-  std::vector<int> first_of_, order_, start_;  // cones island by island
+  linalg::DisjointSets sets_;       // of cones
+  std::vector<int> row_;            // of each cone: its first row in x
+  std::vector<int> first_on_;       // of each node: its first cone
+  std::vector<int> order_, start_;  // cones island by island
   // The present island: its cones, which of them are solved, their sides, A, and the diagonal of A
   // without joints by cone and row.
   std::vector<int> members_;

@@ -16,17 +16,6 @@ using linalg::at;
 
 namespace {
 
-// The same for a problem that is assembled.
-Options solver_options(const BodyOptions& options) {
-  Options out;
-  out.law = options.law;
-  out.tolerance = options.tolerance;
-  out.strict = options.strict;
-  out.max_work = options.max_work;
-  out.enough = options.enough;
-  return out;
-}
-
 // The impulse whose parts along the scaled tangents are its coordinates x: J' x is the impulse p.
 Vector3d in_circle(const std::array<Vector3d, 2>& tangents, const Vector3d& normal,
                    const Vector3d& p) {
@@ -46,10 +35,10 @@ ConeIslands::ConeIslands(ConeSources& sources, LawUse use, const BodyOptions& op
       use_(use),
       near_(use == LawUse::limits ? nullptr : sources.near),
       moments_(use == LawUse::all ? sources.moments : own_),
-      solver_(solver_options(options)) {}
+      solver_(assembled_options(options)) {}
 
 void ConeIslands::set_options(const BodyOptions& options) {
-  solver_.set_options(solver_options(options));
+  solver_.set_options(assembled_options(options));
 }
 
 // Islands of moving bodies, connected by contacts and mechanisms.
@@ -75,7 +64,7 @@ void ConeIslands::find_islands(const std::vector<PointContact>& contacts) {
     (is_mine_[root(contacts[k])] != 0 ? mine_ : rest_).push_back(static_cast<int>(k));
 }
 
-void ConeIslands::add_contacts(const std::vector<PointContact>& contacts, ImpulseHistory& memory) {
+void ConeIslands::add_contacts(const std::vector<PointContact>& contacts, ImpulseMemory& memory) {
   memory.rewind();
   const auto last = [&](std::uint64_t id) {
     const Vector3d* found = memory.find(id);
@@ -93,14 +82,15 @@ void ConeIslands::add_contacts(const std::vector<PointContact>& contacts, Impuls
       scale_tangents(tangents, p, c);
       impulse.head<3>() = in_circle(tangents, p.normal, impulse.head<3>());
     }
+    const BodyCone::Rows& J = c.terms.front().J;
     // The rows of forces have moments about the centre, too.
     for (int r = 0; r < c.cone.rows; ++r)
-      start_of_.push_back(r < 3 ? c.J1.row(r).head<3>().dot(impulse.head<3>())
-                                : c.J1.row(r).tail<3>().dot(impulse.tail<3>()));
+      start_of_.push_back(r < 3 ? J.row(r).head<3>().dot(impulse.head<3>())
+                                : J.row(r).tail<3>().dot(impulse.tail<3>()));
   }
 }
 
-void ConeIslands::add_laws(ImpulseHistory& memory) {
+void ConeIslands::add_laws(ImpulseMemory& memory) {
   for (int k = 0; k < laws_->laws.count(); ++k) {
     if (!laws_->in(use_, k)) continue;
     law_of_.push_back(k);
@@ -136,12 +126,13 @@ void ConeIslands::merge(const std::vector<RigidBody>& bodies,
   Eigen::Index row = 0;
   for (std::size_t k = 0; k < mine_.size(); ++k) {
     const BodyCone& c = cones_[k];
+    const BodyCone::Rows& J = c.terms.front().J;
     const Eigen::Index rows = c.cone.rows, moments = rows - 3;
     const auto x = x_.segment(row, rows);
     const auto contact = at(mine_[k]);
-    out.impulses[contact] = c.J1.topLeftCorner<3, 3>().transpose() * x.head<3>();
+    out.impulses[contact] = J.topLeftCorner<3, 3>().transpose() * x.head<3>();
     if (moments > 0)
-      moments_[contact] = c.J1.bottomRightCorner(moments, 3).transpose() * x.tail(moments);
+      moments_[contact] = J.bottomRightCorner(moments, 3).transpose() * x.tail(moments);
     const bool slides = x.segment<2>(1).norm() >= c.cone.mu * x[0] * (1 - 1e-12);
     out.regimes[contact] = x[0] == 0 ? Regime::separating
                            : slides  ? Regime::sliding
@@ -184,7 +175,7 @@ void ConeIslands::solve(BodySolver& others, const std::vector<RigidBody>& bodies
 }
 
 void ConeIslands::remember_cones(const std::vector<PointContact>& contacts,
-                                 ImpulseHistory& memory) const {
+                                 ImpulseMemory& memory) const {
   const Eigen::Index first = x_.size() - static_cast<Eigen::Index>(law_of_.size());
   for (std::size_t l = 0; l < law_of_.size(); ++l)
     memory.add(LawRows::id(law_of_[l]), {x_[first + static_cast<Eigen::Index>(l)], 0, 0});

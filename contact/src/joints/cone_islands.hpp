@@ -21,7 +21,7 @@ constexpr std::uint64_t moment_id(std::uint64_t contact) {
                     static_cast<int>(contact & 0xffff));
 }
 
-class ImpulseHistory;
+class ImpulseMemory;
 
 /// Joints, their laws and meetings of materials, which make islands of a step more than friction
 /// cones: shared by all its solvers.
@@ -57,12 +57,12 @@ class ConeIslands {
     return near_ != nullptr && near_->meeting(c).is_elliptic();
   }
   void find_islands(const std::vector<PointContact>& contacts);
-  void add_contacts(const std::vector<PointContact>& contacts, ImpulseHistory& memory);
-  void add_laws(ImpulseHistory& memory);
+  void add_contacts(const std::vector<PointContact>& contacts, ImpulseMemory& memory);
+  void add_laws(ImpulseMemory& memory);
   void take_laws();
   void merge(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& out);
-  void remember_cones(const std::vector<PointContact>& contacts, ImpulseHistory& memory) const;
+  void remember_cones(const std::vector<PointContact>& contacts, ImpulseMemory& memory) const;
 
   Mechanisms& mechanisms_;
   LawRows* laws_;  // null: no joints

@@ -72,15 +72,8 @@ BodyCone LawRows::cone(int law, LawUse use) const {
                : std::isfinite(each.bound) ? Cone::bounded(each.bound * dt_)
                                            : Cone::free());
   out.compliance = rows_[at(law)].compliance;
-  for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t) {
-    const auto place = t - laws.rows().begin(law);
-    if (place >= 2) {
-      out.others.emplace_back(t->body, t->G.transpose());
-      continue;
-    }
-    (place == 0 ? out.first : out.second) = t->body;
-    (place == 0 ? out.J1 : out.J2).row(0) = t->G.transpose();
-  }
+  for (const JointRows::Term* t = laws.rows().begin(law); t != laws.rows().end(law); ++t)
+    out.terms.push_back({t->body, t->G.transpose()});
   out.bias[0] = use == LawUse::limits    ? std::max(each.gap, 0.0) / dt_
                 : use == LawUse::plastic ? rows_[at(law)].plastic_bias
                                          : rows_[at(law)].bias;
@@ -93,14 +86,14 @@ double LawRows::start(int law, const Eigen::Vector3d* last) const {
 }
 
 void LawRows::add_bounded(bool without_restitution, const BodySet& bodies,
-                          std::vector<RigidBody>& change) const {
+                          std::vector<Vector6d>& change) const {
   for (int k = 0; k < laws.count(); ++k) {
     if (laws[k].is_limit()) continue;
     const double x = (without_restitution ? plastic : impulses)[at(k)];
     for (const JointRows::Term* t = laws.rows().begin(k); t != laws.rows().end(k); ++t) {
       const RigidBody& body = bodies.motion[at(t->body)];
-      change[at(t->body)].velocity += x * body.inverse_mass * t->G.head<3>();
-      change[at(t->body)].angular_velocity += x * (body.inverse_inertia * t->G.tail<3>());
+      change[at(t->body)].head<3>() += x * body.inverse_mass * t->G.head<3>();
+      change[at(t->body)].tail<3>() += x * (body.inverse_inertia * t->G.tail<3>());
     }
   }
 }

@@ -65,7 +65,7 @@ class LawRows {
   /// Adds the velocities that motors and friction of joints have added in the last problem of
   /// velocities, `without_restitution`: in that without, before joints pass them on.
   void add_bounded(bool without_restitution, const BodySet& bodies,
-                   std::vector<RigidBody>& change) const;
+                   std::vector<Vector6d>& change) const;
   /// Impulses of laws on body i are those without restitution and scale(i) of what it adds.
   void scale_restitution(const Mechanisms& mechanisms, const std::function<double(int)>& scale);
   /// v: at the end of the sub-step.

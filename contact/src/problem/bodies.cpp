@@ -100,8 +100,7 @@ std::shared_ptr<const detail::BodyForm> body_form(const std::vector<RigidBody>& 
       const Matrix36d H = (body == c.first ? c.J1 : c.J2) * C[at(body)];
       for (int h = 0; h < 2; ++h) {
         linalg::PackedBlock block;
-        for (int r = 0; r < 3; ++r)
-          for (int k = 0; k < 3; ++k) block.column[4 * k + r] = H(r, 3 * h + k);
+        detail::as_matrix(block) = H.block<3, 3>(0, 3 * h);
         form->add(2 * body + h, block);
       }
     }

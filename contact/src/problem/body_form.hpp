@@ -22,6 +22,17 @@ inline Matrix6d inverse_mass_root(const Matrix6d& inverse_mass) {
   return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
+/// The block as one of Eigen's.
+inline auto as_matrix(linalg::PackedBlock& block) {
+  return Eigen::Map<Eigen::Matrix3d, 0, Eigen::OuterStride<4>>(block.column);
+}
+inline auto as_matrix(const linalg::PackedBlock& block) {
+  return Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>(block.column);
+}
+inline bool is_zero(const linalg::PackedBlock& block) {
+  return std::all_of(block.column, block.column + 12, [](double v) { return v == 0; });
+}
+
 /// Contacts a body, from which on equations by bodies cost less whatever their fill.
 constexpr int kContactsOfBody = 4;
 
@@ -37,10 +48,7 @@ struct BodyForm {
   void add(int to, const linalg::PackedBlock& block) {
     node.push_back(to);
     H.push_back(block);
-    linalg::PackedBlock across;
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) across.column[4 * r + c] = block.column[4 * c + r];
-    turned.push_back(across);
+    as_matrix(turned.emplace_back()) = as_matrix(block).transpose();
   }
   void end_contact() { start.push_back(static_cast<int>(node.size())); }
 };

@@ -15,13 +15,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using linalg::at;
-using Block = Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>;
 
 constexpr double kRank = 1e-12;  // of the diagonal of A: what rounding leaves of dependent rows
-
-bool is_zero(const PackedBlock& block) {
-  return std::all_of(block.column, block.column + 12, [](double v) { return v == 0; });
-}
 
 /// Columns G of a Cholesky decomposition of S, given by its diagonal and column(k), whose pivots
 /// are the largest of the first `most` rows, to their rank: diagonals below `least` are rounding.
@@ -105,7 +100,7 @@ class MatrixBodies {
     const auto begin = problem_.columns().begin();
     const auto k = std::lower_bound(begin + problem_.row_start()[at(i)],
                                     begin + problem_.row_start()[at(i + 1)], i);
-    return Block(problem_.blocks()[at(static_cast<int>(k - begin))].column).diagonal();
+    return as_matrix(problem_.blocks()[at(static_cast<int>(k - begin))]).diagonal();
   }
 
   void find_rows(int number) {
@@ -119,7 +114,7 @@ class MatrixBodies {
       for (int k = problem_.row_start()[at(i)]; k < problem_.row_start()[at(i + 1)]; ++k) {
         const int j = problem_.columns()[at(k)];
         if (class_of_[at(j)] == number)
-          out.segment<3>(place_[at(j)]) = Block(problem_.blocks()[at(k)].column).row(row % 3);
+          out.segment<3>(place_[at(j)]) = as_matrix(problem_.blocks()[at(k)]).row(row % 3);
       }
       return out;
     };
@@ -153,7 +148,7 @@ class MatrixBodies {
         if (other != last) block = &c.left[last = other];
         if (block->size() == 0)
           block->setZero(c.diagonal.size(), classes_[at(other)].diagonal.size());
-        const Block A(problem_.blocks()[at(k)].column);
+        const auto A = as_matrix(problem_.blocks()[at(k)]);
         for (const Row& row : rows_of_[at(i)])
           for (const Row& column : rows_of_[at(j)])
             (*block)(row.place, column.place) = A(row.component, column.component);
@@ -309,15 +304,15 @@ bool explains(const BodyForm& form, const Problem& problem) {
   for (std::size_t i = 0; i < n; ++i) {
     for (double& z : Z[i].reshaped()) z = (signs() < signs.max() / 2 ? 1 : -1) / root(i);
     for (int k = form.start[i]; k < form.start[i + 1]; ++k)
-      P[at(form.node[at(k)])] += Block(form.H[at(k)].column).transpose() * Z[i];
+      P[at(form.node[at(k)])] += as_matrix(form.H[at(k)]).transpose() * Z[i];
   }
   for (std::size_t i = 0; i < n; ++i) {
     Columns left = Columns::Zero();
     const int first = problem.row_start()[i], end = problem.row_start()[i + 1];
     for (int k = first; k < end; ++k)
-      left += Block(problem.blocks()[at(k)].column) * Z[at(problem.columns()[at(k)])];
+      left += as_matrix(problem.blocks()[at(k)]) * Z[at(problem.columns()[at(k)])];
     for (int k = form.start[i]; k < form.start[i + 1]; ++k)
-      left -= Block(form.H[at(k)].column) * P[at(form.node[at(k)])];
+      left -= as_matrix(form.H[at(k)]) * P[at(form.node[at(k)])];
     // Contacts at nearly the same point leave up to 1e-5 of A, and refinement finds all digits in
     // as many steps.
     if (!(left.cwiseAbs().maxCoeff() <= 1e-4 * root(i) * (end - first))) return false;

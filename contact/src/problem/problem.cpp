@@ -36,9 +36,7 @@ std::vector<int> find_islands(int n, const std::vector<int>& row_start,
   for (int i = 0; i < n; ++i) {
     for (int k = row_start[at(i)]; k < row_start[at(i + 1)]; ++k) {
       if (sets.root(i) == sets.root(columns[at(k)])) continue;
-      bool joined = false;
-      for (double v : blocks[at(k)].column) joined = joined || v != 0;
-      if (joined) sets.join(i, columns[at(k)]);
+      if (!detail::is_zero(blocks[at(k)])) sets.join(i, columns[at(k)]);
     }
   }
   // A root precedes the contacts of its island.
@@ -158,11 +156,8 @@ Problem Problem::sparse(int dimension, std::vector<MatrixBlock> blocks, const li
           "sum of blocks", sum,
           "block (" + std::to_string(row) + ", " + std::to_string(column) + "): ");
     }
-    PackedBlock packed;
-    for (int c = 0; c < 3; ++c)
-      for (int r = 0; r < 3; ++r) packed.column[4 * c + r] = sum(r, c);
     out.columns_.push_back(column);
-    out.blocks_.push_back(packed);
+    detail::as_matrix(out.blocks_.emplace_back()) = sum;
     ++out.row_start_[at(row + 1)];
     if (row == column) out.local_.push_back(local_block(row, sum, mu[row]));
   }
@@ -225,11 +220,9 @@ linalg::MatrixX Problem::dense_matrix() const {
   const int n = contacts(), d = dimension_;
   linalg::MatrixX A = linalg::MatrixX::Zero(d * n, d * n);
   for (int i = 0; i < n; ++i) {
-    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k) {
-      for (int c = 0; c < d; ++c)
-        for (int r = 0; r < d; ++r)
-          A(d * i + r, d * columns_[at(k)] + c) = blocks_[at(k)].column[4 * c + r];
-    }
+    for (int k = row_start_[at(i)]; k < row_start_[at(i + 1)]; ++k)
+      A.block(d * i, d * columns_[at(k)], d, d) =
+          detail::as_matrix(blocks_[at(k)]).topLeftCorner(d, d);
   }
   return A;
 }

@@ -31,6 +31,8 @@ class RankPlan {
   void build(const std::vector<int>& first, const std::vector<int>& second,
              const std::vector<Kind>& kinds, const std::vector<int>& owner, int ranks, int rank);
 
+  int count(int chunk) const;  // contacts of a chunk of `whole`
+
   ContactGraph whole, part;
   std::vector<int> contact_rank, home;  // of all contacts, bodies
   std::vector<int> chunk_rank;          // of the chunks of `whole`
@@ -49,7 +51,6 @@ class RankPlan {
   void select();
   void take_chunk(int chunk);
   void exchanges(int island);
-  int count(int chunk) const;
   template <class Visit>
   void for_bodies(int chunk, const Visit& visit) const;
 

@@ -250,11 +250,8 @@ void RankTeam::Implementation::finish(bool failed) {
 void RankTeam::Implementation::gather_states(int k, std::vector<Eigen::Vector4d>& states) {
   const Island& island = plan.whole.islands[at(k)];
   std::vector<int> counts(at(plan.ranks), 0);
-  const auto contacts = [&](int chunk) {
-    return plan.whole.chunks[at(chunk + 1)].place - plan.whole.chunks[at(chunk)].place;
-  };
   for (int c = island.chunk_begin; c < island.chunk_end; ++c)
-    counts[at(plan.chunk_rank[at(c)])] += kOfState * contacts(c);
+    counts[at(plan.chunk_rank[at(c)])] += kOfState * plan.count(c);
   mine.clear();
   engine.sweeps.for_contacts(plan.part.islands[at(k)], [&](int, detail::Kind kind, int place) {
     const Eigen::Vector4d s = engine.sweeps.state(kind, place);
@@ -266,7 +263,7 @@ void RankTeam::Implementation::gather_states(int k, std::vector<Eigen::Vector4d>
   const double* from = all.data();
   for (const int count : counts) next.push_back(from), from += count;
   for (int c = island.chunk_begin; c < island.chunk_end; ++c)
-    for (int i = 0; i < contacts(c); ++i, next[at(plan.chunk_rank[at(c)])] += kOfState)
+    for (int i = 0; i < plan.count(c); ++i, next[at(plan.chunk_rank[at(c)])] += kOfState)
       states.push_back(Eigen::Map<const Eigen::Vector4d>(next[at(plan.chunk_rank[at(c)])]));
 }
 

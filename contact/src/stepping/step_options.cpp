@@ -1,6 +1,5 @@
 // Tether: options of steps. SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -116,17 +115,11 @@ BodyOptions closing_options(const SteppingOptions& o) {
 }  // namespace detail
 
 const char* name(Gyroscopic gyroscopic) {
-  constexpr std::array names{"none", "explicit", "implicit", "momentum"};
-  const auto k = static_cast<std::size_t>(gyroscopic);
-  return k < names.size() ? names[k] : "?";
+  return detail::text(gyroscopic, {"none", "explicit", "implicit", "momentum"});
 }
-
-const char* name(RestitutionLaw law) {
-  return law == RestitutionLaw::newton ? "newton" : "poisson";
-}
-
+const char* name(RestitutionLaw law) { return detail::text(law, {"newton", "poisson"}); }
 const char* name(SimultaneousImpacts impacts) {
-  return impacts == SimultaneousImpacts::together ? "together" : "in_turn";
+  return detail::text(impacts, {"together", "in_turn"});
 }
 
 double accepted_residual(const SteppingOptions& o) {

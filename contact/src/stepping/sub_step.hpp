@@ -99,12 +99,4 @@ inline void take_velocities(const BodySolution& from, BodySet& bodies) {
   }
 }
 
-/// Velocities of all bodies without these.
-inline void subtract(std::vector<RigidBody>& from, const std::vector<RigidBody>& velocities) {
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    from[i].velocity -= velocities[i].velocity;
-    from[i].angular_velocity -= velocities[i].angular_velocity;
-  }
-}
-
 }  // namespace tether::contact::detail

@@ -16,23 +16,13 @@ using linalg::at;
 
 namespace {
 
-// Throws std::invalid_argument on options that rolling friction does not go with.
-void check_rolling(const SteppingOptions& options) {
-  if (options.law != Law::coulomb)
-    throw std::invalid_argument(
-        std::string("rolling and torsional friction need law = coulomb, not ") + name(options.law));
+// Throws std::invalid_argument on options that this friction does not go with.
+void check_friction(const char* of, const SteppingOptions& options) {
+  const std::string kind = of;
   if (options.restitution_law != RestitutionLaw::newton)
-    throw std::invalid_argument("rolling and torsional friction need restitution_law = newton");
+    throw std::invalid_argument(kind + " friction needs restitution_law = newton");
   if (options.sleep > 0)
-    throw std::invalid_argument("stepping: sleep does not go with rolling friction");
-}
-
-// The same of elliptic friction.
-void check_elliptic(const SteppingOptions& options) {
-  if (options.restitution_law != RestitutionLaw::newton)
-    throw std::invalid_argument("elliptic friction needs restitution_law = newton");
-  if (options.sleep > 0)
-    throw std::invalid_argument("stepping: sleep does not go with elliptic friction");
+    throw std::invalid_argument("stepping: sleep does not go with " + kind + " friction");
 }
 
 std::vector<double> body_sizes(const BodySet& bodies, const std::vector<Surface>& surfaces) {
@@ -58,8 +48,14 @@ SubStepper::SubStepper(BodySet given, std::vector<Surface> surfaces,
   if (!meetings.empty() && !surfaces.empty()) {
     near = std::make_unique<NearContacts>(bodies, std::move(surfaces), meetings, options.law,
                                           options.near_part);
-    if (near->any_rolling()) check_rolling(options);
-    if (near->any_elliptic()) check_elliptic(options);
+    if (near->any_rolling()) {
+      if (options.law != Law::coulomb)
+        throw std::invalid_argument(
+            std::string("rolling and torsional friction need law = coulomb, not ") +
+            name(options.law));
+      check_friction("rolling", options);
+    }
+    if (near->any_elliptic()) check_friction("elliptic", options);
     make_solvers();
     if (options.sleep > 0)
       sleeping = std::make_unique<Sleeping>(bodies, sizes, threshold_speed(options.sleep, options),

@@ -102,9 +102,7 @@ void BodyNewton::begin() {
 }
 
 void BodyNewton::add(int i, const PackedBlock& D, const PackedBlock& L, const PackedBlock& R) {
-  using Map = Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>;
-  Eigen::Map<Eigen::Matrix3d, 0, Eigen::OuterStride<4>>(inverse_[at(i)].column) =
-      Map(D.column).partialPivLu().inverse();
+  as_matrix(inverse_[at(i)]) = as_matrix(D).partialPivLu().inverse();
   PackedBlock X;
   multiply(R, inverse_[at(i)], right_inverse_[at(i)]);
   multiply(inverse_[at(i)], L, inverse_left_[at(i)]);
@@ -151,10 +149,6 @@ namespace {
 constexpr double kClearly = 0.5;  // of the price by contacts: the digits cost refinements
 constexpr double kOrderBodies = 500, kOrderContacts = 100;  // ns a contact, a block
 constexpr double kStepSweeps = 3;                           // of a step besides its factors
-
-bool is_zero(const PackedBlock& block) {
-  return std::all_of(block.column, block.column + 12, [](double v) { return v == 0; });
-}
 
 }  // namespace
 

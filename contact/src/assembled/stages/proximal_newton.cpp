@@ -118,18 +118,11 @@ int ProximalNewton::correct(Search& search, double tau, const PackedVector* anch
 void ProximalNewton::run(Search& search, const PackedVector* x, int most) {
   std::copy(x, x + n_, x_.begin());
   double tau = 1e-4, tau_failed = 0;
-  double reference = search.best_error;
-  int since_gain = 0, failures = 0;
+  int failures = 0;
   for (int outer = 0; outer < most; ++outer) {
     std::copy(x_.begin(), x_.end(), anchor_.begin());
     const int steps = inner(search, tau);
     if (search.solved() || search.exhausted()) return;
-    if (search.best_error < 0.97 * reference) {
-      reference = search.best_error;
-      since_gain = 0;
-    } else if (++since_gain >= 15) {
-      return;
-    }
     if (steps < 0) {
       tau_failed = tau;
       tau = std::min(5 * tau, 10.0);

@@ -45,8 +45,8 @@ double size_of_all(const Mechanisms& mechanisms, const BodySet& bodies) {
 
 }  // namespace
 
-// Along the mode; returns the factor of this, 0 where nothing can move.
-double JointFrequency::displace(const Mechanisms& mechanisms, BodySet& bodies) {
+// Moves then_ along the mode; returns the factor of this, 0 where nothing can move.
+double JointFrequency::displace(const Mechanisms& mechanisms, const BodySet& bodies) {
   const double size = size_of_all(mechanisms, bodies);
   double most = 0;
   for (const Vector6d& v : memory_.mode)
@@ -54,31 +54,22 @@ double JointFrequency::displace(const Mechanisms& mechanisms, BodySet& bodies) {
   if (!(most > 0) || !std::isfinite(most)) return 0;
   // 1e-5 rad, and in parts of the size of what joints hold.
   const double factor = 1e-5 / most;
+  then_ = bodies;
   for (std::size_t i = 0; i < memory_.mode.size(); ++i) {
     const Vector6d move = factor * memory_.mode[i];
     if (move.isZero(0)) continue;
-    bodies.position[i] += move.head<3>();
-    bodies.orientation[i] = (exponential(move.tail<3>()) * bodies.orientation[i]).normalized();
+    then_.position[i] = bodies.position[i] + move.head<3>();
+    then_.orientation[i] = (exponential(move.tail<3>()) * bodies.orientation[i]).normalized();
   }
   return factor;
 }
 
 double JointFrequency::iterate(const RowsAt& rows_at, const JointRows& rows,
                                const std::vector<double>& impulses, double t, double dt,
-                               Mechanisms& mechanisms, BodySet& bodies) {
+                               Mechanisms& mechanisms, const BodySet& bodies) {
   const double factor = displace(mechanisms, bodies);
   if (factor == 0) return 0;
-  const auto put_back = [&] {
-    bodies.position = position_;
-    bodies.orientation = orientation_;
-  };
-  try {
-    rows_at(bodies, t, displaced_);
-  } catch (...) {
-    put_back();
-    throw;
-  }
-  put_back();
+  rows_at(then_, t, displaced_);
   pull_.assign(bodies.position.size(), Vector6d::Zero());
   for (int row = 0; row < rows.count(); ++row) {
     const JointRows::Term* then = displaced_.begin(row);
@@ -107,10 +98,8 @@ double JointFrequency::iterate(const RowsAt& rows_at, const JointRows& rows,
 
 void JointFrequency::update(const RowsAt& rows_at, const JointRows& rows,
                             const std::vector<double>& impulses, double acceleration, double t,
-                            double dt, Mechanisms& mechanisms, BodySet& bodies) {
+                            double dt, Mechanisms& mechanisms, const BodySet& bodies) {
   memory_.acceleration = acceleration;
-  position_ = bodies.position;
-  orientation_ = bodies.orientation;
   if (memory_.mode.empty()) {
     memory_.mode.assign(bodies.position.size(), Vector6d::Zero());
     for (int i = 0; i < bodies.size(); ++i)

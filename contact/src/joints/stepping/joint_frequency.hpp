@@ -23,7 +23,8 @@ class JointFrequency {
 
   /// At the end of a step of length dt, with the factors of its rows and their impulses.
   void update(const RowsAt& rows_at, const JointRows& rows, const std::vector<double>& impulses,
-              double acceleration, double t, double dt, Mechanisms& mechanisms, BodySet& bodies);
+              double acceleration, double t, double dt, Mechanisms& mechanisms,
+              const BodySet& bodies);
   /// By what joints add in the step that begins.
   void follow(double acceleration);
   /// Whether a step of this length resolves how the frequency has changed since the last one ended:
@@ -38,13 +39,12 @@ class JointFrequency {
 
  private:
   double iterate(const RowsAt& rows_at, const JointRows& rows, const std::vector<double>& impulses,
-                 double t, double dt, Mechanisms& mechanisms, BodySet& bodies);
-  double displace(const Mechanisms& mechanisms, BodySet& bodies);
+                 double t, double dt, Mechanisms& mechanisms, const BodySet& bodies);
+  double displace(const Mechanisms& mechanisms, const BodySet& bodies);
 
   StepperMemory::Vibration memory_;
   double at_end_ = 0;  // of the last step, 1/s
-  std::vector<Eigen::Vector3d> position_;
-  std::vector<linalg::Quaternion> orientation_;
+  BodySet then_;       // bodies, displaced along the mode
   std::vector<Vector6d> pull_;
   std::vector<double> u_;
   JointRows displaced_;

@@ -123,13 +123,6 @@ void collide_convex(const Shape& a, const Pose& A, const Shape& b, const Pose& B
   manifold(pair, on_first, on_second);
 }
 
-Vector3d nearest_on_segment(const Vector3d& p, const Vector3d& from, const Vector3d& to) {
-  const Vector3d d = to - from;
-  const double length2 = d.squaredNorm();
-  return length2 > 0 ? Vector3d(from + std::clamp((p - from).dot(d) / length2, 0.0, 1.0) * d)
-                     : from;
-}
-
 struct Segment {
   Vector3d from, to;
 };

@@ -199,6 +199,15 @@ inline Nearest on_ball(const Eigen::Vector3d& centre, double radius, const Eigen
   return {centre + radius * n, n, distance - radius};
 }
 
+/// The point of a segment nearest to p.
+inline Eigen::Vector3d nearest_on_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& from,
+                                          const Eigen::Vector3d& to) {
+  const Eigen::Vector3d d = to - from;
+  const double length2 = d.squaredNorm();
+  if (!(length2 > 0)) return from;
+  return from + std::clamp((p - from).dot(d) / length2, 0.0, 1.0) * d;
+}
+
 /// A corner of a box between -half and half.
 inline Eigen::Vector3d box_corner(int k, const Eigen::Vector3d& half) {
   return {(k & 1) != 0 ? half.x() : -half.x(), (k & 2) != 0 ? half.y() : -half.y(),

@@ -30,10 +30,15 @@ double kinetic_gain(const BodySet& bodies, std::size_t i, const RigidBody& now,
 // Work of the forces of a step on body i, which have changed its velocities by those of `change`:
 // their impulse times the velocities `now` that it moves with. For a weight it is the potential
 // energy that is lost, exactly.
-double work(const BodySet& bodies, std::size_t i, const RigidBody& change, const RigidBody& now) {
-  return bodies.mass[i] * change.velocity.dot(now.velocity) +
-         spin(bodies.inertia[i], bodies.orientation[i], change.angular_velocity)
-             .dot(now.angular_velocity);
+double work(const BodySet& bodies, std::size_t i, const Vector6d& change, const Vector6d& now) {
+  return bodies.mass[i] * change.head<3>().dot(now.head<3>()) +
+         spin(bodies.inertia[i], bodies.orientation[i], change.tail<3>()).dot(now.tail<3>());
+}
+// to = a - b
+void subtract(const std::vector<RigidBody>& a, const std::vector<RigidBody>& b,
+              std::vector<Vector6d>& to) {
+  to.resize(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) to[i] = a[i].velocities() - b[i].velocities();
 }
 
 }  // namespace
@@ -67,18 +72,13 @@ void Restitution::choose(const Impacts& chosen, const std::vector<Strike>& limit
   if (bounces_.empty() && limits_.empty()) return;
   before_ = bodies.motion;
   came_ = chosen.coming();
-  force_ = before_;
-  subtract(force_, came_);
+  subtract(before_, came_, force_);
 }
 
 // By motors and friction of joints, whose impulses count as forces of the step.
 void Restitution::add_laws(bool plastic, const BodySet& bodies,
-                           std::vector<RigidBody>& forces) const {
-  forces.resize(bodies.motion.size());
-  for (RigidBody& each : forces) {
-    each.velocity.setZero();
-    each.angular_velocity.setZero();
-  }
+                           std::vector<Vector6d>& forces) const {
+  forces.assign(bodies.motion.size(), Vector6d::Zero());
   if (sources_.laws) sources_.laws->add_bounded(plastic, bodies, forces);
 }
 
@@ -92,10 +92,10 @@ void Restitution::sum_energies(const BodySet& bodies) {
   for (std::vector<double>* sum : {&constant_, &linear_, &square_, &kinetic_}) sum->assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
     if (bodies.mass[i] == 0) continue;
-    const RigidBody &is = bodies.motion[i], &was = came_[i], &d = change_[i], &f = force_[i];
+    const Vector6d is = bodies.motion[i].velocities(), &d = change_[i], &f = force_[i];
     const std::size_t r = at(islands_.root(static_cast<int>(i)));
-    constant_[r] +=
-        kinetic_gain(bodies, i, is, was) - work(bodies, i, f, is) - work(bodies, i, driven_[i], is);
+    constant_[r] += kinetic_gain(bodies, i, bodies.motion[i], came_[i]) - work(bodies, i, f, is) -
+                    work(bodies, i, driven_[i], is);
     linear_[r] += work(bodies, i, is, d) - work(bodies, i, f, d) - work(bodies, i, driven_[i], d) -
                   work(bodies, i, driven_change_[i], is);
     const double kinetic = 0.5 * work(bodies, i, d, d);
@@ -106,8 +106,7 @@ void Restitution::sum_energies(const BodySet& bodies) {
 
 // Marks the islands that bounce and gain energy in the step; false: none does.
 bool Restitution::gains_energy(const BodySet& bodies, const StepContacts& contacts) {
-  change_ = bodies.motion;
-  subtract(change_, before_);
+  subtract(bodies.motion, before_, change_);
   add_laws(false, bodies, driven_);
   driven_change_ = driven_;
   sum_energies(bodies);
@@ -138,7 +137,8 @@ void Restitution::limit_energy(const BodySet& bodies) {
 
 // From the solution without restitution in `bodies` and `contacts` to `change_` and `added_`.
 void Restitution::add_impulses_again(BodySet& bodies, StepContacts& contacts) {
-  change_ = bodies.motion;
+  change_.resize(bodies.motion.size());
+  for (std::size_t i = 0; i < change_.size(); ++i) change_[i] = bodies.motion[i].velocities();
   for (const Bounce& b : bounces_) {
     const PointContact& c = contacts.points[at(b.contact)];
     const Vector3d p = b.part * contacts.impulses[at(b.contact)];
@@ -147,10 +147,8 @@ void Restitution::add_impulses_again(BodySet& bodies, StepContacts& contacts) {
   }
   solver_.solve(bodies.motion, contacts.points, solution_);
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
-    bodies.motion[i].velocity = change_[i].velocity;
-    bodies.motion[i].angular_velocity = change_[i].angular_velocity;
-    change_[i].velocity = solution_.velocities[i] - change_[i].velocity;
-    change_[i].angular_velocity = solution_.angular_velocities[i] - change_[i].angular_velocity;
+    bodies.motion[i].set_velocities(change_[i]);
+    change_[i] = found(i) - change_[i];
   }
   added_ = solution_.impulses;
   for (const Bounce& b : bounces_)
@@ -172,14 +170,11 @@ void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
   solver_.solve(before_, points_, solution_);
   change_.resize(bodies.motion.size());
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
-    RigidBody &b = bodies.motion[i], &d = change_[i];
     const bool changes = bodies.mass[i] > 0 && gains(static_cast<int>(i));
-    const Vector3d v = changes ? solution_.velocities[i] : b.velocity;
-    const Vector3d w = changes ? solution_.angular_velocities[i] : b.angular_velocity;
-    d.velocity = b.velocity - v;
-    d.angular_velocity = b.angular_velocity - w;
-    b.velocity = v;
-    b.angular_velocity = w;
+    change_[i].setZero();
+    if (!changes) continue;
+    change_[i] = bodies.motion[i].velocities() - found(i);
+    bodies.motion[i].set_velocities(found(i));
   }
   added_.assign(contacts.impulses.size(), Vector3d::Zero());
   for (std::size_t j = 0; j < contact_.size(); ++j) {
@@ -188,7 +183,7 @@ void Restitution::solve_without(BodySet& bodies, StepContacts& contacts) {
     x = solution_.impulses[j];
   }
   add_laws(true, bodies, driven_);
-  subtract(driven_change_, driven_);
+  for (std::size_t i = 0; i < driven_.size(); ++i) driven_change_[i] -= driven_[i];
 }
 
 // Both ends obey the contacts and the cones; so does everything between them.
@@ -196,9 +191,8 @@ void Restitution::add_change(BodySet& bodies, StepContacts& contacts) {
   const auto scale = [&](int body) { return scale_[at(islands_.root(body))]; };
   for (std::size_t i = 0; i < bodies.motion.size(); ++i) {
     if (bodies.mass[i] == 0) continue;
-    const double s = scale(static_cast<int>(i));
-    bodies.motion[i].velocity += s * change_[i].velocity;
-    bodies.motion[i].angular_velocity += s * change_[i].angular_velocity;
+    RigidBody& body = bodies.motion[i];
+    body.set_velocities(body.velocities() + scale(static_cast<int>(i)) * change_[i]);
   }
   for (std::size_t k = 0; k < contacts.points.size(); ++k)
     contacts.impulses[k] += scale(islands_.root(bodies, contacts.points[k])) * added_[k];

@@ -39,7 +39,13 @@ class Restitution {
     int contact;
     double part;  // of the impulse that is given back
   };
-  void add_laws(bool plastic, const BodySet& bodies, std::vector<RigidBody>& forces) const;
+  /// Velocities of body i in the second solve.
+  Vector6d found(std::size_t i) const {
+    Vector6d v;
+    v << solution_.velocities[i], solution_.angular_velocities[i];
+    return v;
+  }
+  void add_laws(bool plastic, const BodySet& bodies, std::vector<Vector6d>& forces) const;
   void sum_energies(const BodySet& bodies);
   bool gains_energy(const BodySet& bodies, const StepContacts& contacts);
   bool gains(int body) { return gains_[static_cast<std::size_t>(islands_.root(body))] != 0; }
@@ -55,7 +61,8 @@ class Restitution {
   ConeSources& sources_;
   // Velocities before the impulses, those that energy is compared with, what the forces of the step
   // add; what restitution adds to velocities without it, to those by motors, and to impulses.
-  std::vector<RigidBody> before_, came_, force_, change_, driven_, driven_change_;
+  std::vector<RigidBody> before_, came_;
+  std::vector<Vector6d> force_, change_, driven_, driven_change_;
   std::vector<Eigen::Vector3d> added_;
   MovingIslands islands_;
   std::vector<char> gains_;  // islands

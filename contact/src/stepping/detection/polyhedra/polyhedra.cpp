@@ -164,12 +164,9 @@ void edge_along_edge(const Placed& a, const Placed& b, const Vector3d& m, double
     if (gap < margin) out.add(x, y, -m, gap, feature);
   };
   const double uu = u.squaredNorm(), vv = v.squaredNorm();
-  if (uu == 0 || vv == 0) {  // a corner
-    Vector3d x = p, y = q;
-    if (uu > 0) x = p + std::clamp(u.dot(q - p) / uu, 0.0, 1.0) * u;
-    if (vv > 0) y = q + std::clamp(v.dot(p - q) / vv, 0.0, 1.0) * v;
-    return add(x, y, 0x7f00);
-  }
+  if (uu == 0 || vv == 0)  // a corner
+    return add(nearest_on_segment(q, p, a.vertex(e.to)), nearest_on_segment(p, q, b.vertex(g.to)),
+               0x7f00);
   // Parallel edges touch at the ends of their overlap, given here by positions along the first one.
   const double from = std::max(0.0, std::min(u.dot(q - p), u.dot(q + v - p)) / uu);
   const double to = std::min(1.0, std::max(u.dot(q - p), u.dot(q + v - p)) / uu);
@@ -182,8 +179,7 @@ void edge_along_edge(const Placed& a, const Placed& b, const Vector3d& m, double
   }
   for (int end = 0; end < 2; ++end) {
     const Vector3d x = p + (end == 0 ? from : to) * u;
-    const Vector3d y = q + std::clamp(v.dot(x - q) / vv, 0.0, 1.0) * v;
-    add(x, y, 0x7f02 + end);
+    add(x, nearest_on_segment(x, q, b.vertex(g.to)), 0x7f02 + end);
   }
 }
 
@@ -210,8 +206,7 @@ Nearest nearest_point(const Placed& b, const Vector3d& c) {
   if (over) return {point, normal, height};
   double least = std::numeric_limits<double>::infinity();
   for (const Polyhedron::Edge& e : b.shape->edges) {
-    const Vector3d &p = b.vertex(e.from), u = b.vertex(e.to) - p;
-    const Vector3d x = p + std::clamp(u.dot(c - p) / u.squaredNorm(), 0.0, 1.0) * u;
+    const Vector3d x = nearest_on_segment(c, b.vertex(e.from), b.vertex(e.to));
     const double distance = (c - x).norm();
     if (distance < least) {
       least = distance;
