@@ -3,7 +3,7 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <problems/problem.hpp>
+#include <problems/dual.hpp>
 
 namespace tether::bench {
 
@@ -30,15 +30,14 @@ inline void evaluate_values(const ida_projection::Constraints& rows, double t,
   });
 }
 
-/// g and C = dg/dy, all of them with dense Jacobians; C is total count x N.
+/// g and C = dg/dy; C is total count x N.
 inline void evaluate_rows(const ida_projection::Constraints& rows, double t,
                           const Eigen::VectorXd& y, Eigen::VectorXd& g, RowMajor& C) {
   evaluate_values(rows, t, y, g);
   C.setZero();
   each_part(rows, [&](const ida_projection::Constraints& part, Eigen::Index first) {
-    std::get<ida_projection::DenseJacobian>(part.jacobian)
-        .fill(t, ida_projection::ConstVector(y.data(), y.size()),
-              ida_projection::Matrix(C.data() + first * y.size(), part.count, y.size()));
+    problems::write_jacobian(part, t, ida_projection::ConstVector(y.data(), y.size()),
+                             C.data() + first * y.size());
   });
 }
 

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <problems/rows.hpp>
+#include <random>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,34 +65,135 @@ struct Dual {
   }
 };
 
-/// found(i, j, dg_i/dy_j) for every entry of g(y), m values of n unknowns; value(y, g) takes Dual
-/// entries.
-template <class Value, class Found>
-void derivatives(const double* y, std::size_t n, std::size_t m, Value value, Found found) {
-  std::vector<Dual> at(y, y + n), g(m);
-  for (std::size_t first = 0; first < n; first += Dual::kDirections) {
-    const std::size_t many = std::min<std::size_t>(Dual::kDirections, n - first);
-    for (std::size_t k = 0; k < many; ++k) at[first + k].slopes[k] = 1.0;
-    value(at.data(), g.data());
-    for (std::size_t k = 0; k < many; ++k) at[first + k].slopes[k] = 0.0;
-    for (std::size_t i = 0; i < m; ++i)
-      for (std::size_t k = 0; k < many; ++k) found(i, first + k, g[i].slopes[k]);
-  }
-}
+/// The unknowns on which a value may depend. Comparisons are decided at random: every branch
+/// counts.
+struct Depends {
+  std::set<int> on;
+  Depends() = default;
+  Depends(double) {}
 
-/// A group of rows of y with `size` entries; value(t, y, g) takes double and Dual entries alike.
+  friend Depends operator-(Depends a) { return a; }
+  friend Depends operator+(Depends a, const Depends& b) { return a += b; }
+  friend Depends operator-(Depends a, const Depends& b) { return a += b; }
+  friend Depends operator*(Depends a, const Depends& b) { return a += b; }
+  friend Depends operator/(Depends a, const Depends& b) { return a += b; }
+  Depends& operator+=(const Depends& b) {
+    on.insert(b.on.begin(), b.on.end());
+    return *this;
+  }
+  Depends& operator-=(const Depends& b) { return *this += b; }
+  friend bool operator<(const Depends&, const Depends&) { return either(); }
+  friend bool operator>(const Depends&, const Depends&) { return either(); }
+  friend bool operator<=(const Depends&, const Depends&) { return either(); }
+
+  friend Depends sin(Depends a) { return a; }
+  friend Depends cos(Depends a) { return a; }
+  friend Depends log10(Depends a) { return a; }
+  friend Depends exp(Depends a) { return a; }
+  friend Depends sqrt(Depends a) { return a; }
+  friend Depends abs(Depends a) { return a; }
+
+ private:
+  static bool either() {
+    static std::minstd_rand random;
+    return random() % 2 == 0;
+  }
+};
+
+/// The entries of the Jacobian of m values g(y) of n unknowns, in compressed rows.
+class Dependence {
+ public:
+  std::vector<int> starts, columns;
+
+  /// value(y, g) takes Depends entries.
+  template <class Value>
+  Dependence(std::size_t n, std::size_t m, Value value) : starts{0}, direction_(n, 0) {
+    constexpr int kTrials = 64;
+    std::vector<Depends> at(n), g(m);
+    for (std::size_t j = 0; j < n; ++j) at[j].on = {static_cast<int>(j)};
+    std::vector<std::set<int>> rows(m);
+    for (int trial = 0; trial < kTrials; ++trial) {
+      value(at.data(), g.data());
+      for (std::size_t i = 0; i < m; ++i) rows[i].insert(g[i].on.begin(), g[i].on.end());
+    }
+    for (const std::set<int>& row : rows) {
+      columns.insert(columns.end(), row.begin(), row.end());
+      starts.push_back(static_cast<int>(columns.size()));
+    }
+    for (std::size_t j = 0; j < n; ++j) choose_direction(static_cast<int>(j), rows);
+  }
+
+  /// found(i, e, slope) for every entry e of row i at y; value(y, g) takes Dual entries.
+  template <class Value, class Found>
+  void derivatives(const double* y, Value value, Found found) const {
+    std::vector<Dual> at(y, y + direction_.size()), g(starts.size() - 1);
+    for (int first = 0; first < directions_; first += Dual::kDirections) {
+      for (std::size_t j = 0; j < at.size(); ++j)
+        for (int k = 0; k < Dual::kDirections; ++k)
+          at[j].slopes[static_cast<std::size_t>(k)] = direction_[j] == first + k ? 1.0 : 0.0;
+      value(at.data(), g.data());
+      for (std::size_t i = 0; i < g.size(); ++i)
+        for (int e = starts[i]; e < starts[i + 1]; ++e) {
+          const int k =
+              direction_[static_cast<std::size_t>(columns[static_cast<std::size_t>(e)])] - first;
+          if (k >= 0 && k < Dual::kDirections)
+            found(i, e, g[i].slopes[static_cast<std::size_t>(k)]);
+        }
+    }
+  }
+
+ private:
+  // The first direction that no unknown before j has in the rows that contain it.
+  void choose_direction(int j, const std::vector<std::set<int>>& rows) {
+    std::set<int> taken;
+    for (const std::set<int>& row : rows)
+      if (row.count(j) > 0)
+        for (auto other = row.begin(); *other < j; ++other)
+          taken.insert(direction_[static_cast<std::size_t>(*other)]);
+    int& direction = direction_[static_cast<std::size_t>(j)];
+    while (taken.count(direction) > 0) ++direction;
+    directions_ = std::max(directions_, direction + 1);
+  }
+
+  std::vector<int> direction_;  // of each unknown: those of one direction share no row
+  int directions_ = 0;
+};
+
+/// A group of rows of y with `size` entries; value(t, y, g) takes double, Dual and Depends entries.
 template <class Value>
 Rows rows_of_values(std::string name, std::vector<std::string> row_names, int size, Value value) {
-  const std::size_t m = row_names.size();
-  return make_rows(
+  const Dependence rows(static_cast<std::size_t>(size), row_names.size(),
+                        [&](const Depends* at, Depends* g) { value(0.0, at, g); });
+  ida_projection::SparseJacobian sparse;
+  sparse.starts = rows.starts;
+  sparse.columns = rows.columns;
+  sparse.fill = [value, rows](double t, ida_projection::ConstVector y,
+                              ida_projection::Vector entries) {
+    rows.derivatives(
+        y.data(), [&](const Dual* at, Dual* g) { value(t, at, g); },
+        [&entries](std::size_t, int e, double slope) { entries[e] = slope; });
+  };
+  Rows group = make_rows(
       std::move(name), std::move(row_names),
       [value](double t, const double* y, double* g) { value(t, y, g); },
-      [value, m, size](double t, const double* y, double* C) {
-        const auto n = static_cast<std::size_t>(size);
-        derivatives(
-            y, n, m, [&](const Dual* at, Dual* g) { value(t, at, g); },
-            [C, n](std::size_t i, std::size_t j, double slope) { C[i * n + j] = slope; });
-      });
+      [](double, const double*, double*) {});
+  group.constraints.jacobian = std::move(sparse);
+  return group;
+}
+
+/// C of a set of dense or sparse rows without those joined to it, row-major; C is zero on entry.
+inline void write_jacobian(const ida_projection::Constraints& rows, double t,
+                           ida_projection::ConstVector y, double* C) {
+  if (const auto* dense = std::get_if<ida_projection::DenseJacobian>(&rows.jacobian)) {
+    dense->fill(t, y, ida_projection::Matrix(C, rows.count, y.size()));
+    return;
+  }
+  const auto& sparse = std::get<ida_projection::SparseJacobian>(rows.jacobian);
+  std::vector<double> entries(sparse.columns.size(), 0.0);
+  sparse.fill(t, y, ida_projection::Vector(entries.data(), std::ptrdiff_t(entries.size())));
+  for (std::size_t i = 0; i + 1 < sparse.starts.size(); ++i, C += y.size())
+    for (int e = sparse.starts[i]; e < sparse.starts[i + 1]; ++e)
+      C[sparse.columns[static_cast<std::size_t>(e)]] = entries[static_cast<std::size_t>(e)];
 }
 
 }  // namespace tether::problems

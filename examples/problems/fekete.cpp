@@ -1,8 +1,9 @@
 // Tether: Fekete points of the test set for IVP solvers. SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
-#include <problems/dual.hpp>
 #include <problems/fekete.hpp>
 #include <problems/mechanism.hpp>
+#include <problems/rows.hpp>
 
 namespace tether::problems {
 
@@ -83,6 +84,13 @@ struct Fekete {
 
 using Form = Mechanism<Fekete>;
 
+// f(k, a, b): entries a and b of positions and velocities turn about axis k.
+template <class F>
+void each_moment(F f) {
+  for (int i = 0; i < Fekete::n; i += 3)
+    for (int k = 0; k < 3; ++k) f(k, i + (k + 1) % 3, i + (k + 2) % 3);
+}
+
 // Four rings of latitude; angles as published.
 std::vector<double> start() {
   struct Ring {
@@ -113,17 +121,21 @@ Problem fekete(const std::string& form) {
   Problem p =
       Form::make(Fekete{}, "fekete", form, start(), std::vector<double>(Fekete::n, 0.0), names);
   p.t_end = 1000.0;
-  p.rows.push_back(rows_of_values("angular momentum", {"about x", "about y", "about z"}, p.size,
-                                  [](double, const auto* y, auto* g) {
-                                    g[0] = g[1] = g[2] = 0.0;
-                                    for (int i = 0; i < Fekete::n; i += 3) {
-                                      const auto *q = y + i, *v = q + Fekete::n;
-                                      for (int k = 0; k < 3; ++k) {
-                                        const int a = (k + 1) % 3, b = (k + 2) % 3;
-                                        g[k] += q[a] * v[b] - q[b] * v[a];
-                                      }
-                                    }
-                                  }));
+  p.rows.push_back(make_rows(
+      "angular momentum", {"about x", "about y", "about z"},
+      [](double, const double* y, double* g) {
+        std::fill(g, g + 3, 0.0);
+        each_moment(
+            [=, v = y + Fekete::n](int k, int a, int b) { g[k] += y[a] * v[b] - y[b] * v[a]; });
+      },
+      [size = p.size](double, const double* y, double* C) {
+        each_moment([=, v = y + Fekete::n](int k, int a, int b) {
+          double* const by_q = C + k * size;
+          double* const by_v = by_q + Fekete::n;
+          by_q[a] = v[b], by_q[b] = -v[a];
+          by_v[b] = y[a], by_v[a] = -y[b];
+        });
+      }));
   p.recommended = {"position", "velocity", "angular momentum"};
   p.reference.assign(static_cast<std::size_t>(p.size), std::nan(""));
   const double at_rest[Fekete::n] = {

@@ -129,12 +129,13 @@ Eigen::VectorXd rest(const Circuit& c) {
   Eigen::MatrixXd J(kNodes, kNodes);
   Eigen::VectorXd f(kNodes);
   double step = 1e-3;
+  const auto flows_of = [&c](const auto* at, auto* flows) { currents(c, 0.0, at, flows); };
+  const Dependence flows(kNodes, kNodes, flows_of);
   for (int iteration = 0; iteration < 10; ++iteration) {
-    derivatives(
-        v.data(), kNodes, kNodes, [&](const Dual* at, Dual* flows) { currents(c, 0.0, at, flows); },
-        [&J](std::size_t i, std::size_t j, double slope) {
-          J(static_cast<int>(i), static_cast<int>(j)) = slope;
-        });
+    J.setZero();
+    flows.derivatives(v.data(), flows_of, [&](std::size_t i, int e, double slope) {
+      J(static_cast<int>(i), flows.columns[static_cast<std::size_t>(e)]) = slope;
+    });
     currents(c, 0.0, v.data(), f.data());
     J.diagonal().array() -= c.gate_capacity / step;
     const Eigen::VectorXd change = J.partialPivLu().solve(f);

@@ -8,6 +8,7 @@
 #include <functional>
 #include <ida/ida.h>
 #include <nvector/nvector_serial.h>
+#include <problems/dual.hpp>
 #include <stdexcept>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
@@ -62,9 +63,7 @@ Eigen::VectorXd value(const Rows& rows, double t, const Eigen::VectorXd& y) {
 
 RowMajor jacobian(const Rows& rows, double t, const Eigen::VectorXd& y) {
   RowMajor C = RowMajor::Zero(rows.constraints.count, y.size());
-  const auto& given = std::get<ida_projection::DenseJacobian>(rows.constraints.jacobian);
-  given.fill(t, ida_projection::ConstVector(y.data(), y.size()),
-             ida_projection::Matrix(C.data(), C.rows(), C.cols()));
+  write_jacobian(rows.constraints, t, ida_projection::ConstVector(y.data(), y.size()), C.data());
   return C;
 }
 
