@@ -162,9 +162,6 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     id_ = id;
     return structure(candidate.t, id);
   }
-  const std::vector<int>& solved_for() const override {
-    return rows_.d.rows.empty() ? rows_.a.columns : RowsAt::solved_for();
-  }
   bool keeps_blocks() const override { return rows_.keeps_blocks(); }
   void accept() override { metric_.accept(); }
   void forget() {

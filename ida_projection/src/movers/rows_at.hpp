@@ -113,12 +113,6 @@ class RowsAt {
   virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
     return Status::success;
   }
-  /// Algebraic variables that rows are solved for, ascending; none where other rows move others, to
-  /// which they respond.
-  virtual const std::vector<int>& solved_for() const {
-    static const std::vector<int> none;
-    return none;
-  }
   /// Length of the moves so far over algebraic variables that `Solution::length` leaves out.
   virtual double solved_length() const { return 0.0; }
   /// Whether no C that is evaluated later can ask for other blocks than set_algebraic() found.

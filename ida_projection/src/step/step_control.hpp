@@ -5,16 +5,14 @@
 #include <cmath>
 #include <utility>
 
+#include "host/candidate.hpp"
 #include "host/mechanisms.hpp"
-#include "movers/rows_at.hpp"
 #include "step/algebraic_test.hpp"
 #include "step/ida_settings.hpp"
 #include "step/order_limit.hpp"
 #include "step/step_smoothing.hpp"
 
 namespace tether::ida_projection {
-
-class Polish;
 
 /// Smooth step sizes, the order limit and the test of algebraic variables, and the rejected steps
 /// that decide whether they begin.
@@ -37,17 +35,17 @@ class StepControl {
     if (same_step) restore(weights, factor);
   }
   /// For an attempt that will be handed over, after a move of this length (infinity: it was not
-  /// moved). The last polish followed the move. `tested`: the variables of IDA's error test,
+  /// moved). `response`: see AlgebraicTest. `tested`: the variables of IDA's error test,
   /// `differential`: those whose oscillations count (null: all); `unmoved`: the correction before a
-  /// sudden move (null: an ordinary one); `rows`: those that were moved; null: there are none.
-  void choose_step(const Attempt& attempt, const Candidate& candidate, Polish& polish, double move,
-                   N_Vector tested, N_Vector differential, N_Vector unmoved, const RowsAt* rows) {
+  /// sudden move (null: an ordinary one).
+  void choose_step(const Attempt& attempt, const Candidate& candidate, double move,
+                   const double* response, N_Vector tested, N_Vector differential,
+                   N_Vector unmoved) {
     // |ycor| decides the next step size, its ratio to the second difference the order.
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
     if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance))
-      test_algebraic(attempt, candidate, polish, std::hypot(move, rows->solved_length()),
-                     rows->solved_for());
+      algebraic_test_.widen(attempt, candidate, move, response);
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {
@@ -77,6 +75,10 @@ class StepControl {
   /// Stiff components have responded to moves; see OrderLimit.
   void expect_oscillations() { order_limit_.expect_oscillations(); }
   bool tests_algebraic() const { return algebraic_test_.acts(); }
+  /// See AlgebraicTest.
+  double response_length(const Candidate& candidate) const {
+    return algebraic_test_.response_length(candidate);
+  }
   double weights_factor() const { return weights_factor_; }
   bool smoothing() const { return smoother_.on(); }
   /// Begins smoothing, unless Advanced::smooth_where_needed is off.
@@ -96,8 +98,6 @@ class StepControl {
   static constexpr int kTrapped = 10 * (kOftenRefused - 1);
 
   void restore(N_Vector weights, double factor) const;
-  void test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
-                      double move, const std::vector<int>& solved);
   void apply(const Control& control);
   void test_unmoved(const Attempt& attempt, double before, double after);
 
