@@ -123,9 +123,9 @@ class Dependence {
     for (std::size_t j = 0; j < n; ++j) choose_direction(static_cast<int>(j), rows);
   }
 
-  /// found(i, e, slope) for every entry e of row i at y; value(y, g) takes Dual entries.
+  /// found(i, e, slope) for every entry e of row i at y; value(y, g) takes Dual entries. Returns g.
   template <class Value, class Found>
-  void derivatives(const double* y, Value value, Found found) const {
+  std::vector<Dual> derivatives(const double* y, Value value, Found found) const {
     std::vector<Dual> at(y, y + direction_.size()), g(starts.size() - 1);
     for (int first = 0; first < directions_; first += Dual::kDirections) {
       for (std::size_t j = 0; j < at.size(); ++j)
@@ -140,6 +140,7 @@ class Dependence {
             found(i, e, g[i].slopes[static_cast<std::size_t>(k)]);
         }
     }
+    return g;
   }
 
  private:
@@ -167,11 +168,19 @@ Rows rows_of_values(std::string name, std::vector<std::string> row_names, int si
   ida_projection::SparseJacobian sparse;
   sparse.starts = rows.starts;
   sparse.columns = rows.columns;
-  sparse.fill = [value, rows](double t, ida_projection::ConstVector y,
-                              ida_projection::Vector entries) {
-    rows.derivatives(
-        y.data(), [&](const Dual* at, Dual* g) { value(t, at, g); },
-        [&entries](std::size_t, int e, double slope) { entries[e] = slope; });
+  const auto derive = [value, rows](double t, const double* y, double* entries) {
+    return rows.derivatives(
+        y, [&](const Dual* at, Dual* g) { value(t, at, g); },
+        [entries](std::size_t, int e, double slope) { entries[e] = slope; });
+  };
+  sparse.fill = [derive](double t, ida_projection::ConstVector y, ida_projection::Vector entries) {
+    derive(t, y.data(), entries.data());
+  };
+  sparse.fill_with_value = [derive](double t, ida_projection::ConstVector y,
+                                    ida_projection::Vector g, ida_projection::Vector entries) {
+    const std::vector<Dual> values = derive(t, y.data(), entries.data());
+    for (std::size_t i = 0; i < values.size(); ++i)
+      g[static_cast<std::ptrdiff_t>(i)] = values[i].value;
   };
   Rows group = make_rows(
       std::move(name), std::move(row_names),

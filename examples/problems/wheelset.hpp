@@ -9,8 +9,8 @@ namespace tether::problems {
 /// Unknowns: position and angles, their rates, the deviation of the spin, angle and offset of the
 /// contact on the right and on the left, two multipliers. dF/dy' depends on the roll angle.
 ///
-/// Rows: "contact" (2), the distances of wheel and rail less those of the published start, "contact
-/// rate" (2) and "tangency" (4), equations of F. Friction does work: no energy.
+/// Rows: "contacts", the distances of wheel and rail less those of the published start (2), and
+/// their rates (2) and tangency (4), equations of F. Friction does work: no energy.
 Problem wheelset();
 
 }  // namespace tether::problems

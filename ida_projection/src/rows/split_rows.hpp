@@ -31,11 +31,13 @@ class StoredRows {
   void visit(int i, Visit f) const {
     const Row& at = row(i);
     const double* c = values_.data() + at.begin;
+    if (!at.full) {
+      const int* const column = columns_.data() + at.begin;
+      for (int e = 0; e < at.count; ++e) f(column[e], c[e]);
+      return;
+    }
     for (int e = 0; e < at.count; ++e)
-      if (!at.full)
-        f(columns_[static_cast<std::size_t>(at.begin + e)], c[e]);
-      else if (c[e] != 0.0)
-        f(e, c[e]);
+      if (c[e] != 0.0) f(e, c[e]);
   }
   /// f(column, entry of values(), was it ever seen not to be zero?) for each place of row i.
   template <class Visit>
