@@ -4,66 +4,88 @@
 //
 //   force -GM m r / |r|^3 at the centre of mass,   potential -GM m / |r|
 //
-// A body is attracted as if all of its mass were at its centre; gravity_gradient.cpp has what its
-// extent adds.
+// A body is attracted as if all of its mass were at its centre. With `gradient` MacCullagh's term
+// adds what its extent does, u = r / |r|, the inertia I about the centre of mass:
+//
+//   potential -GM (tr I - 3 u.I u) / (2 |r|^3),   torque 3 GM u x I u / |r|^3,
+//   force -(3 GM / |r|^4) ((tr I - 5 u.I u) u / 2 + I u)
+//
+// Terms that are left out are of the order of (size of the body / |r|)^3 of the attraction.
+#include <cmath>
+
 #include "mechanics/effect.hpp"
+#include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
 
 namespace {
 
-struct CentralGravityForce : Force {
-  CentralGravityForce(std::vector<CentralGravity> centres, const Bodies& bodies)
-      : centres_(std::move(centres)) {
-    for (int b = 0; b < bodies.world(); ++b)
-      if (bodies.moves(b)) bodies_.push_back(b);
-  }
-  const char* name() const override { return "central gravity"; }
+/// A centre, which the world carries, and a body.
+struct Attraction {
+  int first, second;
+  CentralGravity centre;
+  Inertia of;
 
-  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
-    each(bodies, [&](const Inertia& inertia, const Vector3d& r, double strength) {
-      const double distance = r.norm();
-      loads[at(inertia.slot)].force -= strength / (distance * distance * distance) * r;
-    });
+  template <class S>
+  void pull(const Bodies&, const Frame<S>&, const Frame<S>& B, bool, Wrench<S>&,
+            Wrench<S>& on_second) const {
+    using std::sqrt;
+    Vector3<S> u = B.x;
+    for (int i = 0; i < 3; ++i) u[i] -= centre.at[i];
+    const S square = dot(u, u);
+    const S distance = sqrt(square);
+    const S strength = S(centre.gravitational_parameter * of.mass / (distance * square));
+    for (int i = 0; i < 3; ++i) {
+      on_second.force[i] -= strength * u[i];
+      u[i] /= distance;
+    }
+    if (!centre.gradient) return;
+    const Vector3<S> local = transposed_times(B.R, u), Iu = times(B.R, inertia_times(local));
+    const S torque = S(3 * centre.gravitational_parameter / (distance * square));
+    const S force = S(torque / distance);
+    const S radial = S(0.5 * (of.inertia.trace() - 5.0 * dot(u, Iu)));
+    const Vector3<S> turn = cross(u, Iu);
+    for (int i = 0; i < 3; ++i) {
+      on_second.force[i] -= force * (radial * u[i] + Iu[i]);
+      on_second.torque[i] += torque * turn[i];
+    }
   }
-  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    each(bodies, [&](const Inertia& inertia, const Vector3d& r, double strength) {
-      const double distance = r.norm();
-      const Vector3d u = r / distance;
-      J.add_block(J.motion_row(inertia.slot, 0), kBody * inertia.slot + kPosition,
-                  strength / (distance * distance * distance) *
-                      (Matrix3d::Identity() - 3.0 * u * u.transpose()));
-    });
+  double potential(const Bodies&, const Frame<double>&, const Frame<double>& B) const {
+    const Vector3d r = B.x - centre.at;
+    const double distance = r.norm();
+    double masses = of.mass;
+    if (centre.gradient) {
+      const Vector3d u = B.R.transpose() * r / distance;
+      masses += (of.inertia.trace() - 3 * u.dot(of.inertia * u)) / (2 * distance * distance);
+    }
+    return -centre.gravitational_parameter * masses / distance;
   }
-  double potential(const Bodies& bodies) const override {
-    double sum = 0;
-    each(bodies,
-         [&](const Inertia&, const Vector3d& r, double strength) { sum -= strength / r.norm(); });
-    return sum;
-  }
-  void add_potential_gradient(const Bodies& bodies, double* row) const override {
-    each(bodies, [&](const Inertia& inertia, const Vector3d& r, double strength) {
-      const double distance = r.norm();
-      const Vector3d gradient = strength / (distance * distance * distance) * r;
-      for (int k = 0; k < 3; ++k) row[kBody * inertia.slot + kPosition + k] += gradient[k];
-    });
+  bool works() const { return false; }
+  template <class S>
+  S power(const Bodies&, const Frame<S>&, const Frame<S>&) const {
+    return S(0.0);
   }
 
  private:
-  // f(inertia, r, GM m)
-  template <class F>
-  void each(const Bodies& bodies, const F& f) const {
-    for (const CentralGravity& centre : centres_)
-      for (const int b : bodies_) {
-        const Inertia& inertia = bodies.inertia[at(b)];
-        f(inertia, Vector3d(bodies.frames[at(b)].x - centre.at),
-          centre.gravitational_parameter * inertia.mass);
-      }
+  template <class S>
+  Vector3<S> inertia_times(const Vector3<S>& u) const {
+    Vector3<S> out;
+    for (int i = 0; i < 3; ++i)
+      out[i] = u[0] * of.inertia(i, 0) + u[1] * of.inertia(i, 1) + u[2] * of.inertia(i, 2);
+    return out;
   }
-
-  std::vector<CentralGravity> centres_;
-  std::vector<int> bodies_;  // those that move
 };
+
+struct CentralGravityForce : PairForces<Attraction> {
+  CentralGravityForce(const Scene& scene, const Bodies& bodies) {
+    for (const CentralGravity& centre : scene.central_gravity)
+      for (int b = 0; b < bodies.world(); ++b)
+        if (bodies.moves(b)) push_back({bodies.world(), b, centre, bodies.inertia[at(b)]});
+  }
+  const char* name() const override { return "central gravity"; }
+};
+
+bool has_gradient(const CentralGravity& centre) { return centre.gradient; }
 
 struct CentralGravityEffect : Effect {
   void fields(const Form& root, Scene& scene) const override {
@@ -89,6 +111,7 @@ struct CentralGravityEffect : Effect {
   }
   void plan(const Scene& scene, EngineKind, Lines& lines) const override {
     add_count(lines, "central gravity", scene.central_gravity.size(), "centre");
+    add_count(lines, "gravity gradient", count_if(scene.central_gravity, has_gradient), "centre");
   }
   void take_lengths(const Scene& scene, Largest& length) const override {
     each(scene, [&](double distance, double) { length.take(distance); });
@@ -106,7 +129,7 @@ struct CentralGravityEffect : Effect {
   }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
     if (scene.central_gravity.empty()) return nullptr;
-    return std::make_unique<CentralGravityForce>(scene.central_gravity, bodies);
+    return std::make_unique<CentralGravityForce>(scene, bodies);
   }
 
  private:

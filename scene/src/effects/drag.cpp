@@ -8,98 +8,81 @@
 #include <Eigen/LU>
 
 #include "mechanics/effect.hpp"
+#include "mechanics/pair_forces.hpp"
 
 namespace tether::scene::effects {
 
 namespace {
 
-struct Dragged {
-  int body;
-  Drag drag;
-};
-
 bool has_drag(const Body& body) { return body.drag.has_value(); }
 
-/// Force by speed, N s/m.
-double resistance(const Drag& drag, double speed) { return drag.linear + drag.quadratic * speed; }
+/// The drag of a body, which the world exerts.
+struct Dragged {
+  int first, second;
+  Drag drag;
+  Vector3d wind;
 
-struct DragForce : Force {
-  DragForce(std::vector<Dragged> bodies, const Vector3d& wind)
-      : bodies_(std::move(bodies)), wind_(wind) {}
+  template <class S>
+  Vector3<S> against_wind(const Frame<S>& B) const {
+    Vector3<S> v = B.v;
+    for (int i = 0; i < 3; ++i) v[i] -= wind[i];
+    return v;
+  }
+  /// Force by speed, N s/m.
+  template <class S>
+  S resistance(const Vector3<S>& v) const {
+    using std::sqrt;
+    const S square = dot(v, v);
+    S out(drag.linear);
+    if (square > 0.0) out += drag.quadratic * sqrt(square);
+    return out;
+  }
+  template <class S>
+  void pull(const Bodies&, const Frame<S>&, const Frame<S>& B, bool all, Wrench<S>&,
+            Wrench<S>& on_second) const {
+    if (!all) return;
+    const Vector3<S> v = against_wind(B);
+    const S slows = resistance(v);
+    for (int i = 0; i < 3; ++i) {
+      on_second.force[i] -= slows * v[i];
+      on_second.torque[i] -= drag.rotational * B.W[i];
+    }
+  }
+  double potential(const Bodies&, const Frame<double>&, const Frame<double>&) const { return 0; }
+  bool works() const { return true; }
+  template <class S>
+  S power(const Bodies&, const Frame<S>&, const Frame<S>& B) const {
+    const Vector3<S> v = against_wind(B);
+    return S(-resistance(v) * dot(v, B.v) - drag.rotational * dot(B.W, B.W));
+  }
+};
+
+struct DragForce : PairForces<Dragged> {
+  DragForce(const Scene& scene, const Bodies& bodies) {
+    for (int b = 0; b < bodies.world(); ++b)
+      if (const Body& body = scene.bodies[at(b)]; body.drag && bodies.moves(b))
+        push_back({bodies.world(), b, *body.drag, scene.wind.value_or(Vector3d::Zero())});
+  }
   const char* name() const override { return "drag"; }
   Stepping stepping() const override { return Stepping::implicit; }
 
-  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
-    for (const Dragged& each : bodies_) {
-      Load6& load = loads[at(bodies.inertia[at(each.body)].slot)];
-      const Vector3d v = bodies.frames[at(each.body)].v - wind_;
-      load.force -= resistance(each.drag, v.norm()) * v;
-      load.torque_body -= each.drag.rotational * bodies.w[at(each.body)];
-    }
-  }
-  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    for (const Dragged& each : bodies_) {
-      const int slot = bodies.inertia[at(each.body)].slot;
-      const Matrix3d D = slope(each.drag, bodies.frames[at(each.body)].v - wind_);
-      J.add_block(J.motion_row(slot, 0), kBody * slot + kVelocity, D);
-      J.add_block(J.motion_row(slot, 3), kBody * slot + kSpin,
-                  each.drag.rotational * Matrix3d::Identity());
-    }
-  }
-  bool has_power() const override { return true; }
-  double power(const Bodies& bodies) const override {
-    double sum = 0;
-    for (const Dragged& each : bodies_) {
-      const Vector3d& v = bodies.frames[at(each.body)].v;
-      const Vector3d against = v - wind_;
-      sum -= resistance(each.drag, against.norm()) * against.dot(v) +
-             each.drag.rotational * bodies.w[at(each.body)].squaredNorm();
-    }
-    return sum;
-  }
-  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    for (const Dragged& each : bodies_) {
-      const int column = kBody * bodies.inertia[at(each.body)].slot;
-      const Vector3d& v = bodies.frames[at(each.body)].v;
-      const Vector3d against = v - wind_;
-      const Vector3d by_v =
-          resistance(each.drag, against.norm()) * against + slope(each.drag, against) * v;
-      for (int k = 0; k < 3; ++k) {
-        J.add(J.work_row, column + kVelocity + k, by_v[k]);
-        J.add(J.work_row, column + kSpin + k,
-              2 * each.drag.rotational * bodies.w[at(each.body)][k]);
-      }
-    }
-  }
   // (m + dt resistance) v+ = m v against the wind,   (I + dt rotational) w+ = I w in body axes.
   void step(SteppedBodies& stepped, double dt) const override {
     const Bodies& bodies = stepped.bodies();
-    for (const Dragged& each : bodies_) {
-      const contact::RigidBody& motion = stepped.motion(each.body);
-      const Vector3d before = motion.velocity - wind_;
-      const double force = resistance(each.drag, before.norm());
-      const Vector3d v = wind_ + before / (1 + dt * motion.inverse_mass * force);
+    for (const Dragged& each : items()) {
+      const contact::RigidBody& motion = stepped.motion(each.second);
+      const Vector3d before = motion.velocity - each.wind;
+      const Vector3d v =
+          each.wind + before / (1 + dt * motion.inverse_mass * each.resistance(before));
       Vector3d w = motion.angular_velocity;
       if (each.drag.rotational != 0) {
-        const Matrix3d& I = bodies.inertia[at(each.body)].inertia;
+        const Matrix3d& I = bodies.inertia[at(each.second)].inertia;
         const Matrix3d slowed = I + dt * each.drag.rotational * Matrix3d::Identity();
-        w = bodies.frames[at(each.body)].R * (slowed.inverse() * (I * bodies.w[at(each.body)]));
+        w = bodies.frames[at(each.second)].R * (slowed.inverse() * (I * bodies.w[at(each.second)]));
       }
-      stepped.set_velocity(each.body, v, w);
+      stepped.set_velocity(each.second, v, w);
     }
   }
-
- private:
-  // d(resistance v) / dv
-  static Matrix3d slope(const Drag& drag, const Vector3d& v) {
-    const double speed = v.norm();
-    Matrix3d D = resistance(drag, speed) * Matrix3d::Identity();
-    if (speed > 0) D += drag.quadratic / speed * v * v.transpose();
-    return D;
-  }
-
-  std::vector<Dragged> bodies_;
-  Vector3d wind_;
 };
 
 struct DragEffect : Effect {
@@ -130,28 +113,16 @@ struct DragEffect : Effect {
               scene.wind ? ", in a wind" : "");
   }
   void limit_momenta(Momenta& momenta) const override {
-    for (const Dragged& each : dragged(momenta.scene)) {
-      const std::string what =
-          "the drag of body \"" + momenta.scene.bodies[at(each.body)].name + "\"";
+    for (const Body& body : momenta.scene.bodies) {
+      if (!body.drag || body.fixed) continue;
+      const std::string what = "the drag of body \"" + body.name + "\"";
       momenta.push(what);
       momenta.axes.none(what);
     }
   }
   bool does_work(const Scene& scene) const override { return any_of(scene.bodies, has_drag); }
-  std::unique_ptr<Force> make_force(const Scene& scene, const Bodies&) const override {
-    std::vector<Dragged> bodies = dragged(scene);
-    return bodies.empty() ? nullptr
-                          : std::make_unique<DragForce>(std::move(bodies),
-                                                        scene.wind.value_or(Vector3d::Zero()));
-  }
-
- private:
-  static std::vector<Dragged> dragged(const Scene& scene) {
-    std::vector<Dragged> all;
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-      if (const Body& body = scene.bodies[b]; body.drag && !body.fixed)
-        all.push_back({static_cast<int>(b), *body.drag});
-    return all;
+  std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
+    return does_work(scene) ? std::make_unique<DragForce>(scene, bodies) : nullptr;
   }
 };
 

@@ -1,6 +1,6 @@
 // Tether: invariants of the motion. SPDX-License-Identifier: BSD-3-Clause
 //
-// The smooth engine keeps them by projection, see smooth/kept_invariants.hpp.
+// The smooth engine keeps them by projection, see smooth/terms.hpp.
 #include "mechanics/effect.hpp"
 
 namespace tether::scene::effects {

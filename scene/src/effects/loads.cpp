@@ -9,6 +9,7 @@
 
 #include "bounds.hpp"
 #include "mechanics/effect.hpp"
+#include "mechanics/pair_forces.hpp"
 #include "numbers.hpp"
 
 namespace tether::scene::effects {
@@ -53,65 +54,41 @@ double factor_of(const Load& load, const Bodies& bodies) {
   return span > 0 ? mean(h.table, t, t + span) : value(h.table, t, t == bodies.since);
 }
 
-struct LoadForce : Force {
-  explicit LoadForce(std::vector<Load> loads) : loads_(std::move(loads)) {}
+/// A load on a body, which the world exerts.
+struct LoadItem {
+  int first, second;
+  Load load;
+
+  template <class S>
+  Vector3<S> in_world(const Vector3d& u, const Frame<S>& B) const {
+    return load.in_body ? times(B.R, u) : Vector3<S>(S(u[0]), S(u[1]), S(u[2]));
+  }
+  template <class S>
+  void pull(const Bodies& now, const Frame<S>&, const Frame<S>& B, bool all, Wrench<S>&,
+            Wrench<S>& on_second) const {
+    if (!all) return;
+    const double factor = factor_of(load, now);
+    const Vector3<S> force = in_world(load.force, B), torque = in_world(load.torque, B);
+    for (int i = 0; i < 3; ++i) {
+      on_second.force[i] += factor * force[i];
+      on_second.torque[i] += factor * torque[i];
+    }
+  }
+  double potential(const Bodies&, const Frame<double>&, const Frame<double>&) const { return 0; }
+  bool works() const { return true; }
+  template <class S>
+  S power(const Bodies& now, const Frame<S>&, const Frame<S>& B) const {
+    return S(factor_of(load, now) *
+             (dot(in_world(load.force, B), B.v) + dot(in_world(load.torque, B), B.W)));
+  }
+};
+
+struct LoadForce : PairForces<LoadItem> {
+  LoadForce(const Scene& scene, const Bodies& bodies) {
+    for (const Load& each : scene.loads)
+      if (bodies.moves(each.body)) push_back({bodies.world(), each.body, each});
+  }
   const char* name() const override { return "loads"; }
-
-  void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
-    for (const Load& each : loads_) {
-      Load6& load = loads[at(bodies.inertia[at(each.body)].slot)];
-      const double factor = factor_of(each, bodies);
-      load.force += factor * in_world(each, each.force, bodies);
-      load.torque_world += factor * in_world(each, each.torque, bodies);
-    }
-  }
-  // d(R^T torque) = [R^T torque]x turn; in body axes d(R force) = -R [force]x turn
-  void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    for (const Load& each : loads_) {
-      const int slot = bodies.inertia[at(each.body)].slot;
-      const Matrix3d& R = bodies.frames[at(each.body)].R;
-      const double factor = factor_of(each, bodies);
-      if (each.in_body)
-        J.add_turn(J.motion_row(slot, 0), slot, factor * R * skew(each.force));
-      else
-        J.add_turn(J.motion_row(slot, 3), slot, -factor * skew(R.transpose() * each.torque));
-    }
-  }
-  bool has_power() const override { return true; }
-  double power(const Bodies& bodies) const override {
-    double sum = 0;
-    for (const Load& each : loads_) {
-      const Frame<double>& f = bodies.frames[at(each.body)];
-      sum += factor_of(each, bodies) * (in_world(each, each.force, bodies).dot(f.v) +
-                                        in_world(each, each.torque, bodies).dot(f.W));
-    }
-    return sum;
-  }
-  void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
-    for (const Load& each : loads_) {
-      const int slot = bodies.inertia[at(each.body)].slot;
-      const Frame<double>& f = bodies.frames[at(each.body)];
-      const double factor = factor_of(each, bodies);
-      const Vector3d force = factor * in_world(each, each.force, bodies);
-      const Vector3d torque = factor * f.R.transpose() * in_world(each, each.torque, bodies);
-      for (int k = 0; k < 3; ++k) {
-        J.add(J.work_row, kBody * slot + kVelocity + k, -force[k]);
-        J.add(J.work_row, kBody * slot + kSpin + k, -torque[k]);
-      }
-      const Vector3d turn = each.in_body
-                                ? Vector3d(factor * each.force.cross(f.R.transpose() * f.v))
-                                : bodies.w[at(each.body)].cross(torque);
-      const Eigen::RowVector4d q = turn.transpose() * bodies.turns[at(slot)];
-      for (int k = 0; k < 4; ++k) J.add(J.work_row, kBody * slot + kQuaternion + k, -q[k]);
-    }
-  }
-
- private:
-  static Vector3d in_world(const Load& load, const Vector3d& u, const Bodies& bodies) {
-    return load.in_body ? Vector3d(bodies.frames[at(load.body)].R * u) : u;
-  }
-
-  std::vector<Load> loads_;  // on bodies that move
 };
 
 void read_table(Fields& in, std::optional<LoadHistory>& history) {
@@ -202,10 +179,7 @@ struct LoadEffect : Effect {
   }
   bool does_work(const Scene& scene) const override { return !scene.loads.empty(); }
   std::unique_ptr<Force> make_force(const Scene& scene, const Bodies& bodies) const override {
-    std::vector<Load> loads;
-    for (const Load& each : scene.loads)
-      if (bodies.moves(each.body)) loads.push_back(each);
-    return loads.empty() ? nullptr : std::make_unique<LoadForce>(std::move(loads));
+    return scene.loads.empty() ? nullptr : std::make_unique<LoadForce>(scene, bodies);
   }
 };
 

@@ -18,15 +18,15 @@ struct Item {
   double stiffness, damping, rest;
 
   template <class S>
-  void pull(double, const Frame<S>& A, const Frame<S>& B, bool with_damping, Wrench<S>& on_first,
-            Wrench<S>& on_second) const;
-  double potential(double, const Frame<double>& A, const Frame<double>& B) const {
+  void pull(const Bodies&, const Frame<S>& A, const Frame<S>& B, bool with_damping,
+            Wrench<S>& on_first, Wrench<S>& on_second) const;
+  double potential(const Bodies&, const Frame<double>& A, const Frame<double>& B) const {
     const double stretch = (point<0>(B, at_second).x - point<0>(A, at_first).x).norm() - rest;
     return 0.5 * stiffness * stretch * stretch;
   }
   bool works() const { return damping > 0; }
   template <class S>
-  S power(double, const Frame<S>& A, const Frame<S>& B) const;
+  S power(const Bodies&, const Frame<S>& A, const Frame<S>& B) const;
 };
 
 /// Vector from the first to the second point, and its rate.
@@ -41,7 +41,7 @@ struct Span {
 };
 
 template <class S>
-void Item::pull(double, const Frame<S>& A, const Frame<S>& B, bool with_damping,
+void Item::pull(const Bodies&, const Frame<S>& A, const Frame<S>& B, bool with_damping,
                 Wrench<S>& on_first, Wrench<S>& on_second) const {
   using std::sqrt;
   const Span<S> span(*this, A, B);
@@ -60,7 +60,7 @@ void Item::pull(double, const Frame<S>& A, const Frame<S>& B, bool with_damping,
 }
 
 template <class S>
-S Item::power(double, const Frame<S>& A, const Frame<S>& B) const {
+S Item::power(const Bodies&, const Frame<S>& A, const Frame<S>& B) const {
   const Span<S> span(*this, A, B);
   const S along = dot(span.d, span.rate());
   return S(-damping * along * along / dot(span.d, span.d));
@@ -110,8 +110,8 @@ struct SpringForces : PairForces<Item> {
     for (const Item& each : items()) {
       const Frame<double>&A = bodies.frames[at(each.first)], &B = bodies.frames[at(each.second)];
       if (!(Span<double>(each, A, B).d.squaredNorm() > 0)) continue;  // no direction
-      const auto [a, b] = pair_of<double>(0, each, {A, B}, false);
-      const auto [with_a, with_b] = pair_of<double>(0, each, {A, B}, true);
+      const auto [a, b] = pair_of<double>(bodies, each, {A, B}, false);
+      const auto [with_a, with_b] = pair_of<double>(bodies, each, {A, B}, true);
       stepped.push(each.first, dt, a.force, a.torque);
       stepped.push(each.second, dt, b.force, b.torque);
       stepped.damp(each.first, dt, with_a.force - a.force, with_a.torque - a.torque);

@@ -46,18 +46,18 @@ inline void put_gradient(const Bodies& bodies, int body, const Wrench<double>& w
 
 /// Values and derivatives of the forces of items from one formula. An Item has
 ///
-///   first, second                indices of its bodies in Bodies
-///   pull<S>(t, A, B, all, a, b)  adds to the wrenches of both bodies; not `all`: the part that has
-///                                a potential
-///   potential(t, A, B)           of that part, J
-///   works()                      whether there is another part
-///   power<S>(t, A, B)            of the other part, W
+///   first, second                   indices of its bodies in Bodies
+///   pull<S>(now, A, B, all, a, b)   adds to the wrenches of both bodies; not `all`: the part that
+///                                   has a potential. `now`: all bodies, for their time
+///   potential(now, A, B)            of that part, J
+///   works()                         whether there is another part
+///   power<S>(now, A, B)             of the other part, W
 template <class Item>
 class PairForces : public Force {
  public:
   void add(const Bodies& bodies, std::vector<Load6>& loads) const override {
     for (const Item& each : items_) {
-      const auto [a, b] = pair_of<double>(bodies.time, each, frame_pair(bodies, each), true);
+      const auto [a, b] = pair_of<double>(bodies, each, frame_pair(bodies, each), true);
       put_wrench(bodies, each.first, a, loads);
       put_wrench(bodies, each.second, b, loads);
     }
@@ -65,7 +65,7 @@ class PairForces : public Force {
   void add_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Item& each : items_) {
       const auto frames = seed_pair(bodies, each.first, each.second);
-      const auto [a, b] = pair_of<Dual>(bodies.time, each, frames, true);
+      const auto [a, b] = pair_of<Dual>(bodies, each, frames, true);
       put_wrench(bodies, each.first, each.second, each.first, frames.first, a, J);
       put_wrench(bodies, each.first, each.second, each.second, frames.second, b, J);
     }
@@ -73,13 +73,12 @@ class PairForces : public Force {
   double potential(const Bodies& bodies) const override {
     double sum = 0;
     for (const Item& each : items_)
-      sum += each.potential(bodies.time, bodies.frames[at(each.first)],
-                            bodies.frames[at(each.second)]);
+      sum += each.potential(bodies, bodies.frames[at(each.first)], bodies.frames[at(each.second)]);
     return sum;
   }
   void add_potential_gradient(const Bodies& bodies, double* row) const override {
     for (const Item& each : items_) {
-      const auto [a, b] = pair_of<double>(bodies.time, each, frame_pair(bodies, each), false);
+      const auto [a, b] = pair_of<double>(bodies, each, frame_pair(bodies, each), false);
       put_gradient(bodies, each.first, a, row);
       put_gradient(bodies, each.second, b, row);
     }
@@ -91,14 +90,14 @@ class PairForces : public Force {
     double sum = 0;
     for (const Item& each : items_)
       if (each.works())
-        sum += each.template power<double>(bodies.time, bodies.frames[at(each.first)],
+        sum += each.template power<double>(bodies, bodies.frames[at(each.first)],
                                            bodies.frames[at(each.second)]);
     return sum;
   }
   void add_power_jacobian(const Bodies& bodies, JacobianBlocks& J) const override {
     for (const Item& each : items_) {
       const auto [A, B] = seed_pair(bodies, each.first, each.second);
-      const Dual P = each.works() ? each.template power<Dual>(bodies.time, A, B) : Dual(0.0);
+      const Dual P = each.works() ? each.template power<Dual>(bodies, A, B) : Dual(0.0);
       J.add_body(J.work_row, bodies, each.first, P.derivatives(), 0, -1.0);
       J.add_body(J.work_row, bodies, each.second, P.derivatives(), kBodyDirections, -1.0);
     }
@@ -114,10 +113,10 @@ class PairForces : public Force {
     return {bodies.frames[at(each.first)], bodies.frames[at(each.second)]};
   }
   template <class S>
-  static std::pair<Wrench<S>, Wrench<S>> pair_of(double t, const Item& each,
+  static std::pair<Wrench<S>, Wrench<S>> pair_of(const Bodies& bodies, const Item& each,
                                                  const FramePair<S>& frames, bool all) {
     std::pair<Wrench<S>, Wrench<S>> wrenches{no_wrench<S>(), no_wrench<S>()};
-    each.pull(t, frames.first, frames.second, all, wrenches.first, wrenches.second);
+    each.pull(bodies, frames.first, frames.second, all, wrenches.first, wrenches.second);
     return wrenches;
   }
 

@@ -59,13 +59,13 @@ struct BallTable {
     return p;
   }
   template <class S>
-  void pull(double, const Frame<S>& A, const Frame<S>& B, bool all, Wrench<S>& on_first,
+  void pull(const Bodies&, const Frame<S>& A, const Frame<S>& B, bool all, Wrench<S>& on_first,
             Wrench<S>& on_second) const {
     const Vector3<S> M = moment(A, B, all);
     on_first.torque += M;
     on_second.torque -= M;
   }
-  double potential(double, const Frame<double>& A, const Frame<double>& B) const {
+  double potential(const Bodies&, const Frame<double>& A, const Frame<double>& B) const {
     if (stiffness.empty()) return 0;
     double square = 0, sum = 0;
     for (const joints::Coordinate& each : turn) square += std::pow(each.value(A, B), 2);
@@ -78,7 +78,7 @@ struct BallTable {
   }
   bool works() const { return !damping.empty(); }
   template <class S>
-  S power(double, const Frame<S>& A, const Frame<S>& B) const {
+  S power(const Bodies&, const Frame<S>& A, const Frame<S>& B) const {
     const Vector3<S> w = A.W - B.W;
     const S square = dot(w, w);
     return S(-softened(damping, square) * square);

@@ -127,13 +127,13 @@ struct Sprung : Gains {
   }
 
   template <class S>
-  void pull(double t, const Frame<S>& A, const Frame<S>& B, bool all, Wrench<S>& on_first,
+  void pull(const Bodies& now, const Frame<S>& A, const Frame<S>& B, bool all, Wrench<S>& on_first,
             Wrench<S>& on_second) const {
-    if (all || !drives) coordinate.pull(A, B, force(t, A, B, all), on_first, on_second);
+    if (all || !drives) coordinate.pull(A, B, force(now.time, A, B, all), on_first, on_second);
   }
-  double potential(double t, const Frame<double>& A, const Frame<double>& B) const {
+  double potential(const Bodies& now, const Frame<double>& A, const Frame<double>& B) const {
     if (drives || !(stiffness > 0)) return 0;
-    return stored(stretch(t, A, B)) - stored(offset);
+    return stored(stretch(now.time, A, B)) - stored(offset);
   }
   double stored(double s) const {
     const double x = std::abs(s), most = bound / stiffness;
@@ -141,9 +141,9 @@ struct Sprung : Gains {
   }
   bool works() const { return drives || damping > 0; }
   template <class S>
-  S power(double t, const Frame<S>& A, const Frame<S>& B) const {
+  S power(const Bodies& now, const Frame<S>& A, const Frame<S>& B) const {
     const S speed = coordinate.rate(A, B);
-    if (drives || !(stiffness > 0)) return S(force(t, A, B, true) * speed);
+    if (drives || !(stiffness > 0)) return S(force(now.time, A, B, true) * speed);
     return S(-damping * speed * speed);
   }
 };
