@@ -53,15 +53,7 @@ void InstantScribe::flush() {
 
 void InstantScribe::set_places(double time, const std::vector<BodyState>& states) {
   bodies_.time = time;
-  for (const std::size_t b : scene_.moving()) {
-    const BodyState& s = states[b];
-    mechanics::Frame<double>& f = bodies_.frames[b];
-    f.x = s.position;
-    f.R = s.orientation.toRotationMatrix();
-    f.v = s.velocity;
-    f.W = s.angular_velocity;
-    bodies_.w[b] = f.R.transpose() * f.W;
-  }
+  for (const std::size_t b : scene_.moving()) bodies_.put(static_cast<int>(b), states[b]);
 }
 
 void InstantScribe::put_impact(double time, const std::vector<BodyState>& before,
@@ -143,8 +135,7 @@ void InstantScribe::put_pushes(std::string& out) {
     const std::string_view name = force->name();
     // The judge has these of its own; forces of joints have those of their springs.
     if (name == "gravity" || name == "gyroscopic term" || name == "joint springs") continue;
-    for (mechanics::Load6& each : loads_)
-      each.force = each.torque_body = each.torque_world = Vector3d::Zero();
+    mechanics::clear(loads_);
     force->add(bodies_, loads_);
     for (const std::size_t b : scene_.moving()) {
       const mechanics::Load6& load = loads_[at(bodies_.inertia[b].slot)];

@@ -98,14 +98,9 @@ std::vector<JointLines::Unit> JointLines::units(const mechanics::Bodies& bodies,
   rows_.set_time(time);
   rows_.each([&](const auto& row) {
     if constexpr (!is_coupling<decltype(row)>)
-      for (int i = 0; i < row.count; ++i) {
-        Unit& unit =
-            out.emplace_back(Unit{row.row + i, row.joint, {row.first, row.second}, {none, none}});
-        double one[3] = {0, 0, 0};
-        one[i] = 1;
-        row.pull(bodies.frames[at(row.first)], bodies.frames[at(row.second)], one, unit.on[0],
-                 unit.on[1]);
-      }
+      JointRows::each_unit_pull(row, bodies, [&](int i, const auto& a, const auto& b) {
+        out.push_back({row.row + i, row.joint, {row.first, row.second}, {a, b}});
+      });
   });
   int number = rows_.count();
   for (const auto& [joint, along, component] : free_) {

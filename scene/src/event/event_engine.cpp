@@ -42,12 +42,8 @@ class EventEngine : public ResumableEngine {
         scene_(event::seen_from(origin_, scaled(scene, units_))),
         options_(driver_options(scene_, units_.time)),
         model_(std::make_unique<SceneModel>(scene_, units_.time, units_.length)),
-        reactions_(scene_, mechanics::placed_bodies(scene_)) {
-    bodies_.resize(scene.bodies.size());
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-      bodies_[b].position = scene.bodies[b].position;
-      bodies_[b].orientation = scene.bodies[b].orientation.normalized();
-    }
+        reactions_(scene_, mechanics::placed_bodies(scene_)),
+        bodies_(mechanics::placed_states(scene)) {
     now_.setZero(model_->coordinates() + model_->velocities() + 1);
     if (scene.certificate) to_certify_ = scene;
     if (begin == Begin::later) return;

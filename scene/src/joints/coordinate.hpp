@@ -215,8 +215,6 @@ class JointLaws {
   JointLaws(const Scene& scene, const Bodies& bodies);
 
   bool any() const { return !joints_.empty() || !slips_.empty(); }
-  /// Whether add() needs velocities, and not positions only.
-  bool sees_velocities() const;
   const std::vector<effects::CapstanSlip>& slips() const { return slips_; }
   /// In the order of add(), after which these can be asked for.
   int count() const { return static_cast<int>(placed_.size()); }
@@ -252,13 +250,11 @@ class JointLaws {
   /// Puts the bounds that the impulses leave into the laws of the last add(); true: they changed.
   bool change_bounds(const std::vector<double>& impulses, double dt,
                      contact::JointLaws& laws) const;
-  /// Adds what the impulses (of the last add()) over dt do to their joints; springs are Forces and
-  /// tell theirs.
+  /// Adds a force along a law to that of its joint, or to the means of its cable's tensions.
+  void add_force(int law, const Bodies& bodies, double force, Forces& out) const;
+  /// The same of the impulses (of the last add()) over dt; springs are Forces and tell theirs.
   void add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
-                  std::vector<JointForce>& forces) const;
-  /// The same of cables, to the means of their tensions.
-  void part_tensions(const std::vector<double>& impulses, double dt,
-                     std::vector<SpringForce>& forces) const;
+                  Forces& out) const;
 
  private:
   struct Item {

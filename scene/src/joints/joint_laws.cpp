@@ -92,12 +92,6 @@ double JointLaws::value(const Item& item, const Bodies& bodies) const {
   return value + turn * std::round((middle - value) / turn);
 }
 
-bool JointLaws::sees_velocities() const {
-  return !slips_.empty() || any_of(joints_, [](const Item& item) {
-    return item.coordinate.is_component() && !item.law.spring->damping_table.empty();
-  });
-}
-
 // Its components stand one after the other.
 void JointLaws::measure_ball(std::size_t component, const Bodies& bodies,
                              mechanics::JointLawList& out) const {
@@ -173,27 +167,23 @@ void JointLaws::place(int item, double sign, const Bodies& bodies, contact::Join
   });
 }
 
-void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
-                           std::vector<JointForce>& forces) const {
-  if (!(dt > 0)) return;
-  for (std::size_t i = 0; i < impulses.size() && i < placed_.size(); ++i) {
-    if (placed_[i].sprung || slip(static_cast<int>(i))) continue;
-    const Item& item = joints_[at(placed_[i].item)];
-    const double x = placed_[i].sign * impulses[i] / dt;
-    JointForce& force = forces[at(item.joint)];
-    const bool angle = item.coordinate.what() == MotionOf::angle;
-    (angle ? force.moment : force.force) += x * item.coordinate.direction(bodies);
-    force.drive += x;
+void JointLaws::add_force(int law, const Bodies& bodies, double force, Forces& out) const {
+  if (const effects::CapstanSlip* of = slip(law)) {
+    out.springs[at(of->cable())].tension += force;
+    out.springs[at(of->cable())].tension_second -= force;
+    return;
   }
+  const double x = sign(law) * force;
+  JointForce& on = out.joints[at(joint(law))];
+  const bool angle = coordinate(law).what() == MotionOf::angle;
+  (angle ? on.moment : on.force) += x * coordinate(law).direction(bodies);
+  on.drive += x;
 }
 
-void JointLaws::part_tensions(const std::vector<double>& impulses, double dt,
-                              std::vector<SpringForce>& forces) const {
+void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
+                           Forces& out) const {
   for (std::size_t i = 0; dt > 0 && i < impulses.size() && i < placed_.size(); ++i)
-    if (const effects::CapstanSlip* of = slip(static_cast<int>(i))) {
-      forces[at(of->cable())].tension += impulses[i] / dt;
-      forces[at(of->cable())].tension_second -= impulses[i] / dt;
-    }
+    if (!placed_[i].sprung) add_force(static_cast<int>(i), bodies, impulses[i] / dt, out);
 }
 
 }  // namespace tether::scene::joints

@@ -53,8 +53,11 @@ class JointRows {
   void values(const Bodies& bodies, double* g) const;
   /// G: 6 columns for each moving body, by slot, of its velocity and angular velocity in body axes.
   void gradient(const Bodies& bodies, Eigen::MatrixXd& G) const;
-  /// Calls f(i, body, force, torque in body axes) for the multiplier i of `row` being 1, the others
-  /// 0, and each moving body that it acts on.
+  /// Calls f(i, the loads on its first and second body) for the multiplier i of `row` being 1, the
+  /// others 0.
+  template <class Row, class F>
+  static void each_unit_pull(const Row& row, const Bodies& bodies, const F& f);
+  /// The same by f(i, body, force, torque in body axes) for each moving body that it acts on.
   template <class Row, class F>
   static void each_unit_load(const Row& row, const Bodies& bodies, const F& f);
 
@@ -140,17 +143,24 @@ void JointRows::values(const Bodies& bodies, double* g) const {
 }
 
 template <class Row, class F>
-void JointRows::each_unit_load(const Row& row, const Bodies& bodies, const F& f) {
-  const Frame<double>&A = bodies.frames[at(row.first)], &B = bodies.frames[at(row.second)];
+void JointRows::each_unit_pull(const Row& row, const Bodies& bodies, const F& f) {
   double unit[3] = {0, 0, 0};
   for (int i = 0; i < row.count; ++i) {
     unit[i] = 1.0;
     Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
-    row.pull(A, B, unit, a, b);
+    row.pull(bodies.frames[at(row.first)], bodies.frames[at(row.second)], unit, a, b);
     unit[i] = 0.0;
-    if (bodies.moves(row.first)) f(i, row.first, a.force, Vector3d(A.R.transpose() * a.torque));
-    if (bodies.moves(row.second)) f(i, row.second, b.force, Vector3d(B.R.transpose() * b.torque));
+    f(i, a, b);
   }
+}
+
+template <class Row, class F>
+void JointRows::each_unit_load(const Row& row, const Bodies& bodies, const F& f) {
+  each_unit_pull(row, bodies, [&](int i, const Wrench<double>& a, const Wrench<double>& b) {
+    for (const auto& [body, on] : {std::pair(row.first, &a), {row.second, &b}})
+      if (bodies.moves(body))
+        f(i, body, on->force, Vector3d(bodies.frames[at(body)].R.transpose() * on->torque));
+  });
 }
 
 /// The reactions that the multipliers of the rows make, N and N m, for each joint of the scene.

@@ -28,17 +28,44 @@ Bodies weighed_bodies(const Scene& scene) {
   return out;
 }
 
+std::vector<BodyState> placed_states(const Scene& scene) {
+  std::vector<BodyState> out(scene.bodies.size());
+  for (std::size_t b = 0; b < out.size(); ++b) {
+    out[b].position = scene.bodies[b].position;
+    out[b].orientation = scene.bodies[b].orientation.normalized();
+  }
+  return out;
+}
+
+void Bodies::put(int body, const BodyState& state) {
+  Frame<double>& f = frames[at(body)];
+  f.x = state.position;
+  f.R = state.orientation.toRotationMatrix();
+  f.v = state.velocity;
+  f.W = state.angular_velocity;
+  w[at(body)] = f.R.transpose() * f.W;
+}
+
+BodyState state_of(const contact::BodySet& set, int body) {
+  return {set.position[at(body)], set.orientation[at(body)], set.motion[at(body)].velocity,
+          set.motion[at(body)].angular_velocity};
+}
+
+void put_state(const BodyState& state, int body, contact::BodySet& set) {
+  set.position[at(body)] = state.position;
+  set.orientation[at(body)] = state.orientation;
+  set.motion[at(body)].velocity = state.velocity;
+  set.motion[at(body)].angular_velocity = state.angular_velocity;
+}
+
 SteppedBodies::SteppedBodies(const Scene& scene)
     : bodies_(weighed_bodies(scene)), before_(bodies_), loads_(at(bodies_.moving)) {}
 
 void SteppedBodies::begin(const contact::BodySet& set, const Vector3d& weight) {
   for (int b = 0; b < set.size(); ++b) {
     if (!bodies_.moves(b)) continue;
-    Frame<double>& f = before_.frames[at(b)];
-    f.x = set.position[at(b)];
-    f.R = set.orientation[at(b)].toRotationMatrix();
-    f.v = set.motion[at(b)].velocity - weight;
-    f.W = set.motion[at(b)].angular_velocity;
+    before_.put(b, state_of(set, b));
+    before_.frames[at(b)].v -= weight;
   }
 }
 
@@ -52,27 +79,12 @@ void SteppedBodies::damp(int body, double dt, const Vector3d& force, const Vecto
 
 void SteppedBodies::read(contact::BodySet& set) {
   set_ = &set;
-  copy_motions(set);
+  copy(set);
 }
 
-void SteppedBodies::copy_motions(const contact::BodySet& set) {
-  for (int b = 0; b < set.size(); ++b) {
-    if (!bodies_.moves(b)) continue;
-    Frame<double>& f = bodies_.frames[at(b)];
-    f.x = set.position[at(b)];
-    f.R = set.orientation[at(b)].toRotationMatrix();
-    f.v = set.motion[at(b)].velocity;
-    f.W = set.motion[at(b)].angular_velocity;
-    bodies_.w[at(b)] = f.R.transpose() * f.W;
-  }
-}
-
-void SteppedBodies::read_positions(const contact::BodySet& set) {
-  for (int b = 0; b < set.size(); ++b) {
-    if (!bodies_.moves(b)) continue;
-    bodies_.frames[at(b)].x = set.position[at(b)];
-    bodies_.frames[at(b)].R = set.orientation[at(b)].toRotationMatrix();
-  }
+void SteppedBodies::copy(const contact::BodySet& set) {
+  for (int b = 0; b < set.size(); ++b)
+    if (bodies_.moves(b)) bodies_.put(b, state_of(set, b));
 }
 
 void SteppedBodies::set_velocity(int body, const Vector3d& velocity,

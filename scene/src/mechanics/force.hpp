@@ -31,7 +31,13 @@ struct Bodies {
   bool moves(int body) const { return inertia[at(body)].slot >= 0; }
   /// Index of a body of the scene, where -1 is the world.
   int index(int body) const { return body < 0 ? world() : body; }
+  /// Gives a body a state, without accelerations.
+  void put(int body, const BodyState& state);
 };
+
+/// Body `body` of the contact library's set, to read and to set.
+BodyState state_of(const contact::BodySet& set, int body);
+void put_state(const BodyState& state, int body, contact::BodySet& set);
 
 /// Point `p` and direction `u` of world axes in the axes of a body.
 inline Vector3d point_in(const Frame<double>& f, const Vector3d& p) {
@@ -55,6 +61,8 @@ inline void clear(std::vector<Load6>& loads) {
 Bodies placed_bodies(const Scene& scene);
 /// The same with the inertia of those that move.
 Bodies weighed_bodies(const Scene& scene);
+/// The places of all bodies in the scene, at rest.
+std::vector<BodyState> placed_states(const Scene& scene);
 
 /// The assembly makes the same calls of add() in the same order every time. So it runs once to
 /// record places; afterwards an entry goes to the slot of the same call, in any storage.
@@ -127,12 +135,6 @@ class JacobianBlocks {
     if (const int slot = bodies.inertia[at(body)].slot; slot >= 0)
       add_directions(row, slot, d, first, factor);
   }
-  /// A 3 x 3 block of derivatives to the turn of a body.
-  void add_turn(int row, int slot, const Matrix3d& block) {
-    const Eigen::Matrix<double, 3, 4> d = block * turns_[static_cast<std::size_t>(slot)];
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 4; ++k) add(row + i, kBody * slot + kQuaternion + k, d(i, k));
-  }
   void add_block(int row, int column, const Matrix3d& block) {
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) add(row + i, column + k, block(i, k));
@@ -163,10 +165,8 @@ class SteppedBodies {
 
   /// Takes over positions and velocities; later calls change `set`.
   void read(contact::BodySet& set);
-  /// Both, for what changes nothing.
-  void copy_motions(const contact::BodySet& set);
-  /// Positions only, for energies.
-  void read_positions(const contact::BodySet& set);
+  /// The same, for what changes nothing.
+  void copy(const contact::BodySet& set);
 
   const contact::RigidBody& motion(int body) const { return set_->motion[at(body)]; }
   void set_velocity(int body, const Vector3d& velocity, const Vector3d& angular_velocity);

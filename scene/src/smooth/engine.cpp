@@ -32,13 +32,9 @@ class SmoothEngine : public Engine {
         options_(scene_.smooth.value_or(SmoothOptions{})),
         start_time_(scene_.start ? scene_.start->time : 0),
         system_(std::make_unique<System>(scene_, units_)),
-        reactions_(scene_, mechanics::placed_bodies(scene_)) {
+        reactions_(scene_, mechanics::placed_bodies(scene_)),
+        bodies_(mechanics::placed_states(scene)) {
     options_.max_step = effects::longest_step(scene_, options_.max_step);
-    bodies_.resize(scene.bodies.size());
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-      bodies_[b].position = scene.bodies[b].position;
-      bodies_[b].orientation = scene.bodies[b].orientation.normalized();
-    }
     y_ = system_->start_state();
     check_start(kStartTolerance, kStartTolerance, "is taken for rounding");
     system_->complete(start_time_, y_, yp_);

@@ -57,12 +57,6 @@ StepScribe::~StepScribe() {
   sheet_.leave(*this);
 }
 
-BodyState StepScribe::state(int body) const {
-  const contact::BodySet& b = stepper_.bodies();
-  return {b.position[at(body)], b.orientation[at(body)], b.motion[at(body)].velocity,
-          b.motion[at(body)].angular_velocity};
-}
-
 void StepScribe::take_states(std::vector<BodyState>& out) const {
   out.resize(chain_.size());
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = state(static_cast<int>(i));
@@ -280,13 +274,8 @@ void StepScribe::put_laws(std::string& out, double t, double dt) {
 
 const mechanics::Bodies& StepScribe::place(const std::vector<BodyState>& states) {
   places_ = stepper_.bodies();
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    places_.position[i] = states[i].position;
-    places_.orientation[i] = states[i].orientation;
-    places_.motion[i].velocity = states[i].velocity;
-    places_.motion[i].angular_velocity = states[i].angular_velocity;
-  }
-  at_places_.read_positions(places_);
+  for (int i = 0; i < places_.size(); ++i) mechanics::put_state(states[at(i)], i, places_);
+  at_places_.copy(places_);
   return at_places_.bodies();
 }
 

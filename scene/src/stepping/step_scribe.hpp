@@ -53,7 +53,7 @@ class StepScribe final : public certificate::Source {
                       const std::vector<contact::PointContact>& solved,
                       const std::vector<BodyState>& velocities) const;
   void reach(double time, const std::vector<int>& bodies, std::string& out);
-  BodyState state(int body) const;
+  BodyState state(int body) const { return mechanics::state_of(stepper_.bodies(), body); }
   void take_states(std::vector<BodyState>& out) const;
 
   const Scene scene_;

@@ -14,27 +14,21 @@ SteppedJoints::SteppedJoints(const Scene& scene)
 
 void SteppedJoints::add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) {
   bodies_.set_time(t, 0);
-  if (laws_.sees_velocities())
-    bodies_.copy_motions(bodies);
-  else
-    bodies_.read_positions(bodies);
+  bodies_.copy(bodies);
   laws_.add(bodies_.bodies(), out);
 }
 
-std::vector<JointForce> SteppedJoints::forces(const contact::BodySet& bodies, double t,
-                                              const std::vector<double>& impulses,
-                                              const std::vector<double>& law_impulses, double dt) {
-  bodies_.read_positions(bodies);
+std::vector<JointForce> SteppedJoints::reactions(const contact::BodySet& bodies, double t,
+                                                 const std::vector<double>& impulses, double dt) {
+  bodies_.copy(bodies);
   rows_.set_time(t);
   std::vector<double> multipliers(at(rows_.count()), 0);
   for (std::size_t i = 0; i < multipliers.size() && dt > 0; ++i) multipliers[i] = impulses[i] / dt;
-  std::vector<JointForce> out = reactions_.find(rows_, bodies_.bodies(), multipliers.data());
-  laws_.add_forces(bodies_.bodies(), law_impulses, dt, out);
-  return out;
+  return reactions_.find(rows_, bodies_.bodies(), multipliers.data());
 }
 
 void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) {
-  bodies_.read_positions(bodies);
+  bodies_.copy(bodies);
   rows_.set_time(t);
   rows_.values<0>(bodies_.bodies(), g);
   std::fill_n(g + rows_.count(), laws_.slips().size(), 0.0);
@@ -43,25 +37,22 @@ void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) 
 // A multiplier pulls with the gradient of its row. JointRows::each goes kind by kind, and rows are
 // numbered joint by joint; the parts of a coupling may have bodies in common.
 void SteppedJoints::add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) {
-  bodies_.read_positions(bodies);
+  bodies_.copy(bodies);
   rows_.set_time(t);
   const Bodies& all = bodies_.bodies();
   gradients_.resize(at(rows_.count()));
   for (Gradient& each : gradients_) each.count = 0;
   rows_.each([&](const auto& row) {
-    double unit[3] = {0, 0, 0}, by_time[3];
+    double by_time[3];
     row.rate_by_time(by_time);
-    for (int i = 0; i < row.count; ++i) {
-      unit[i] = 1;
-      Wrench<double> a = no_wrench<double>(), b = no_wrench<double>();
-      row.pull(all.frames[at(row.first)], all.frames[at(row.second)], unit, a, b);
-      unit[i] = 0;
-      Gradient& gradient = gradients_[at(row.row + i)];
-      gradient.joint = row.joint;
-      gradient.rate = -by_time[i];
-      if (row.first != all.world()) gradient.add(row.first, a);
-      if (row.second != all.world()) gradient.add(row.second, b);
-    }
+    joints::JointRows::each_unit_pull(row, all,
+                                      [&](int i, const Wrench<double>& a, const Wrench<double>& b) {
+                                        Gradient& gradient = gradients_[at(row.row + i)];
+                                        gradient.joint = row.joint;
+                                        gradient.rate = -by_time[i];
+                                        if (row.first != all.world()) gradient.add(row.first, a);
+                                        if (row.second != all.world()) gradient.add(row.second, b);
+                                      });
   });
   for (const Gradient& each : gradients_) {
     out.add(each.joint, each.rate);

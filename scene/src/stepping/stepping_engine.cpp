@@ -295,16 +295,14 @@ void SteppingEngine::report_failure() const {
 
 void SteppingEngine::read_bodies() {
   const contact::BodySet& b = stepper_.bodies();
-  for (std::size_t i = 0; i < bodies_.size(); ++i)
-    bodies_[i] = {b.position[i], b.orientation[i], b.motion[i].velocity,
-                  b.motion[i].angular_velocity};
+  for (int i = 0; i < b.size(); ++i) bodies_[mechanics::at(i)] = mechanics::state_of(b, i);
 }
 
 Diagnostics SteppingEngine::diagnostics() const {
   const contact::BodySet& b = stepper_.bodies();
   Diagnostics d;
   d.kinetic_energy = contact::kinetic_energy(b);
-  stepped_.read_positions(b);
+  stepped_.copy(b);
   for (const auto& force : forces_) d.potential_energy += force->potential(stepped_.bodies());
   if (energy_error_) d.energy_error = energy_error_->sum();
   d.momentum = contact::momentum(b);
@@ -353,12 +351,12 @@ const std::vector<ContactState>& SteppingEngine::contacts() const {
 Forces SteppingEngine::forces() const {
   Forces out;
   if (joints_)
-    out.joints = joints_->forces(stepper_.bodies(), time(), stepper_.joint_impulses(),
-                                 stepper_.law_impulses(), stepper_.last_sub_step());
+    out.joints = joints_->reactions(stepper_.bodies(), time(), stepper_.joint_impulses(),
+                                    stepper_.last_sub_step());
   stepped_.set_time(time(), 0);
-  stepped_.copy_motions(stepper_.bodies());
+  stepped_.copy(stepper_.bodies());
   for (const auto& force : forces_) force->report(stepped_.bodies(), out);
-  if (joints_) joints_->part_tensions(stepper_.law_impulses(), stepper_.last_sub_step(), out);
+  if (joints_) joints_->add_law_forces(stepper_.law_impulses(), stepper_.last_sub_step(), out);
   return out;
 }
 
@@ -394,12 +392,7 @@ void SteppingEngine::save(std::ostream& out) const {
 
 void SteppingEngine::set_bodies(const std::vector<BodyState>& states) {
   contact::BodySet& b = stepper_.bodies();
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    b.position[i] = states[i].position;
-    b.orientation[i] = states[i].orientation;
-    b.motion[i].velocity = states[i].velocity;
-    b.motion[i].angular_velocity = states[i].angular_velocity;
-  }
+  for (int i = 0; i < b.size(); ++i) mechanics::put_state(states[mechanics::at(i)], i, b);
   if (energy_error_) energy_error_->begin_at(b);
 }
 

@@ -20,12 +20,11 @@ class SteppedJoints final : public contact::JointEquations {
   void values(const contact::BodySet& bodies, double t, double* g) override;
   void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
   /// Impulses by row, over dt, as forces at these positions.
-  std::vector<JointForce> forces(const contact::BodySet& bodies, double t,
-                                 const std::vector<double>& impulses,
-                                 const std::vector<double>& law_impulses, double dt);
-  /// Parts the mean tensions of cables that rub.
-  void part_tensions(const std::vector<double>& law_impulses, double dt, Forces& out) const {
-    laws_.part_tensions(law_impulses, dt, out.springs);
+  std::vector<JointForce> reactions(const contact::BodySet& bodies, double t,
+                                    const std::vector<double>& impulses, double dt);
+  /// Adds those of the laws there.
+  void add_law_forces(const std::vector<double>& impulses, double dt, Forces& out) const {
+    laws_.add_forces(bodies_.bodies(), impulses, dt, out);
   }
   bool has_laws() const override { return laws_.any(); }
   void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;

@@ -26,15 +26,7 @@ struct Placed {
 Placed place(const Scene& scene, const std::vector<BodyState>& states) {
   Placed out{weighed_bodies(scene), {}};
   out.now = out.start;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    if (scene.bodies[b].fixed) continue;
-    Frame<double>& f = out.now.frames[b];
-    f.x = states[b].position;
-    f.R = states[b].orientation.toRotationMatrix();
-    f.v = states[b].velocity;
-    f.W = states[b].angular_velocity;
-    out.now.w[b] = f.R.transpose() * f.W;
-  }
+  for (const std::size_t b : scene.moving()) out.now.put(static_cast<int>(b), states[b]);
   return out;
 }
 

@@ -343,21 +343,6 @@ Forces SceneModel::forces_of(const joints::Reactions& reactions,
   return out;
 }
 
-void SceneModel::add_law_force(int contact, const VectorXd& parts, Forces& out) const {
-  if (const auto* slip = slip_law(contact)) {
-    out.springs[at(slip->cable())].tension += parts[1];
-    out.springs[at(slip->cable())].tension_second -= parts[1];
-    return;
-  }
-  const int law = joint_law(contact);
-  const bool bounded = this->law(contact).is_bounded();
-  JointForce& force = out.joints[at(joint_laws().joint(law))];
-  const double x = bounded ? parts[1] : parts[0];
-  const bool angle = joint_laws().coordinate(law).what() == joints::MotionOf::angle;
-  (angle ? force.moment : force.force) += x * law_direction(contact);
-  force.drive += joint_laws().sign(law) * x;
-}
-
 std::string SceneModel::undecided(int contact) {
   return is_pair(contact) && pair(contact).is_flush(bodies_.all())
              ? "a cylinder lies on its flat end, whose contact the event engine does not have"

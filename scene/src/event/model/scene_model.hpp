@@ -120,7 +120,10 @@ class SceneModel final : public Model {
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
   double potential() const;
   /// Adds the force of a closed contact that is a law of a joint or cable to the force of that.
-  void add_law_force(int contact, const VectorXd& parts, Forces& out) const;
+  void add_law_force(int contact, const VectorXd& parts, Forces& out) const {
+    joint_laws().add_force(joint_law(contact), bodies_.all(),
+                           law(contact).is_bounded() ? parts[1] : parts[0], out);
+  }
   /// Forces of joints, by the multipliers of their rows, and of springs, at the state that is set.
   Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
 
