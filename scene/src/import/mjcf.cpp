@@ -47,7 +47,6 @@ class Reader {
   void joint(const Node& node, int link, const Around& around);
   void geom(const Node& node, int link, const Around& around);
   void inertial(const Node& node, int link);
-  void take_name(int line, const std::string& name, const char* kind, std::set<std::string>& names);
   Link& link(int k) { return model_.links[at(k)]; }
 
   Model& model_;
@@ -59,13 +58,6 @@ class Reader {
 };
 
 bool is_joint(const Node& node) { return is(node, "joint") || is(node, "freejoint"); }
-
-void Reader::take_name(int line, const std::string& name, const char* kind,
-                       std::set<std::string>& names) {
-  if (!names.insert(name).second)
-    problems_.add(line, fmt::format("{} \"{}\": name", kind, name), "",
-                  fmt::format("another {} has it already", kind));
-}
 
 void Reader::children(const Node& node, int of, const Around& around) {
   // Geoms last: whether they give mass is known then.
@@ -139,7 +131,7 @@ void Reader::body(const Node& node, int parent, const Around& around) {
   out.parent = parent;
   out.name = tag.has("name") ? tag.name("name", "") + around.suffix
                              : fmt::format("body {}", bodies_.size() + 1);
-  take_name(out.line, out.name, "body", bodies_);
+  problems_.take(out.line, "body", out.name, bodies_);
   const Vector3d at = tag.vector("pos", Vector3d::Zero());
   out.pose = around.frame * placed(settings_.orientation(tag), at);
   const Around inside{tag.text("childclass", around.class_name), Isometry3d::Identity(),
@@ -163,7 +155,7 @@ void Reader::joint(const Node& node, int of, const Around& around) {
   out.name = tag.has("name")
                  ? tag.name("name", "") + around.suffix
                  : fmt::format("joint {} of {}", link(of).joints.size() + 1, link(of).name);
-  take_name(out.line, out.name, "joint", joints_);
+  problems_.take(out.line, "joint", out.name, joints_);
   const auto kind = kinds.find(
       is_freejoint ? "free" : tag.word("type", "hinge", {"hinge", "slide", "ball", "free"}));
   if (kind != kinds.end()) out.kind = kind->second;

@@ -23,25 +23,22 @@ struct Tree {
   std::vector<std::vector<int>> children;  // of each link
 };
 
-std::map<std::string, int> names_of(const std::vector<Link>& links, Problems& problems) {
+std::map<std::string, int> names_of(const std::vector<Link>& links) {
   std::map<std::string, int> out;
-  for (std::size_t k = 0; k < links.size(); ++k)
-    if (!out.emplace(links[k].name, static_cast<int>(k)).second)
-      problems.add(links[k].line, fmt::format("link \"{}\": name", links[k].name), "",
-                   "another link has it already");
+  for (std::size_t k = 0; k < links.size(); ++k) out.emplace(links[k].name, static_cast<int>(k));
   return out;
 }
 
 Tree tree_of(const std::vector<Link>& links, const std::vector<UrdfJoint>& joints,
              Problems& problems) {
-  const std::map<std::string, int> index = names_of(links, problems);
+  const std::map<std::string, int> index = names_of(links);
+  std::set<std::string> links_named, names;
+  for (const Link& link : links) problems.take(link.line, "link", link.name, links_named);
   Tree out{std::vector<const UrdfJoint*>(links.size(), nullptr),
            std::vector<std::vector<int>>(links.size())};
-  std::map<std::string, int> names;
   for (const UrdfJoint& joint : joints) {
     const std::string path = fmt::format("joint \"{}\": ", joint.name);
-    if (!names.emplace(joint.name, 0).second)
-      problems.add(joint.line, path + "name", "", "another joint has it already");
+    problems.take(joint.line, "joint", joint.name, names);
     const auto parent = index.find(joint.parent), child = index.find(joint.child);
     for (const auto& [found, key, name] :
          {std::tuple(parent, "parent", &joint.parent), {child, "child", &joint.child}})
@@ -319,7 +316,7 @@ std::vector<Link> in_tree_order(std::vector<Link> links, const std::vector<UrdfJ
     }
   if (!problems.clean()) return {};
   std::vector<Link> out;
-  const std::map<std::string, int> index = names_of(links, problems);
+  const std::map<std::string, int> index = names_of(links);
   for (const int k : order) {
     Link link = std::move(links[at(k)]);
     if (const UrdfJoint* joint = tree.carrier[at(k)]) {

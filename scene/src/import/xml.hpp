@@ -4,6 +4,7 @@
 // before anything is read from them.
 #pragma once
 
+#include <fmt/format.h>
 #include <tinyxml2.h>
 
 #include <set>
@@ -40,6 +41,12 @@ class Problems : public files::Report {
   void add(int line, std::string field, std::string value, const std::string& allowed) {
     Report::add({file_, std::max(line, 1), 0}, std::move(field), std::move(value),
                 line > 0 ? allowed : allowed + " (in a file that it includes)");
+  }
+  /// Takes a name, or says that another thing of its kind has it already.
+  void take(int line, const char* kind, const std::string& name, std::set<std::string>& names) {
+    if (!names.insert(name).second)
+      add(line, fmt::format("{} \"{}\": name", kind, name), "",
+          fmt::format("another {} has it already", kind));
   }
   /// The same of an element; `inside`: what is wrong in it.
   void add(const Node& node, std::string_view inside, const std::string& allowed) {

@@ -178,13 +178,15 @@ Json scene_data(const Scene& scene, const std::vector<std::size_t>& moving, cons
 
 }  // namespace player
 
+namespace formats {
+
 namespace {
 
 using namespace player;
 
 class PageRecorder : public Recorder {
  public:
-  PageRecorder(const std::string& file, const formats::Beginning& run)
+  PageRecorder(const std::string& file, const Beginning& run)
       : scene_(run.scene),
         file_(file),
         start_energy_(run.start_energy),
@@ -244,19 +246,10 @@ class PageRecorder : public Recorder {
   Film film_;
 };
 
-void add_page(const std::string& html, const formats::Beginning& run, formats::Recorders& out) {
-  out.push_back(std::make_unique<PageRecorder>(html, run));
-}
-
 }  // namespace
 
-namespace formats {
-
-const Format& html_format() {
-  static const Format format{"html", ".html", "Page that plays the run in a browser, on its own",
-                             add_page};
-  return format;
-}
+TETHER_FORMAT(html, ".html", "Page that plays the run in a browser, on its own",
+              add_recorder<PageRecorder>)
 
 }  // namespace formats
 

@@ -3,15 +3,16 @@
 
 #include "formats.hpp"
 
-namespace tether::scene {
+namespace tether::scene::formats {
 
 namespace {
 
-using certificate::Sheet;
-
 class CertificateRecorder : public Recorder {
  public:
-  CertificateRecorder(const std::string& file, Sheet& sheet) : sheet_(sheet) { sheet_.open(file); }
+  CertificateRecorder(const std::string& file, const Beginning& run)
+      : sheet_(*run.scene.certificate) {
+    sheet_.open(file);
+  }
 
   void record(const Engine&, const Diagnostics&) override { sheet_.flush(); }
   void keep(const Engine&) override { sheet_.keep(); }
@@ -21,25 +22,12 @@ class CertificateRecorder : public Recorder {
   }
 
  private:
-  Sheet& sheet_;
+  certificate::Sheet& sheet_;
 };
-
-void add_certificate(const std::string& file, const formats::Beginning& run,
-                     formats::Recorders& out) {
-  out.push_back(std::make_unique<CertificateRecorder>(file, *run.scene.certificate));
-}
 
 }  // namespace
 
-namespace formats {
+TETHER_FORMAT(certificate, ".cert", "Certificate: all that a judge needs (tether verify)",
+              add_recorder<CertificateRecorder>)
 
-const Format& certificate_format() {
-  static const Format format{"certificate", ".cert",
-                             "Certificate: all that a judge needs (tether verify)",
-                             add_certificate};
-  return format;
-}
-
-}  // namespace formats
-
-}  // namespace tether::scene
+}  // namespace tether::scene::formats

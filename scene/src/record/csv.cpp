@@ -9,11 +9,9 @@
 #include "formats.hpp"
 #include "output/files.hpp"
 
-namespace tether::scene {
+namespace tether::scene::formats {
 
 namespace {
-
-using formats::Beginning;
 
 /// Numbers and texts between commas.
 template <class... Fields>
@@ -180,29 +178,23 @@ std::string beside(const std::string& csv, const char* ending) {
   return std::filesystem::path(csv).replace_extension(ending).string();
 }
 
-void add_tables(const std::string& csv, const Beginning& run, formats::Recorders& out) {
-  out.push_back(std::make_unique<CsvRecorder>(csv, run));
+void add_tables(const std::string& csv, const Beginning& run, Recorders& out) {
+  add_recorder<CsvRecorder>(csv, run, out);
   if (run.plan.engine == EngineKind::event)
-    out.push_back(std::make_unique<EventRecorder>(beside(csv, ".events.csv"), run));
+    add_recorder<EventRecorder>(beside(csv, ".events.csv"), run, out);
   if (run.scene.output.forces && !run.scene.pairs.empty())
-    out.push_back(std::make_unique<ContactRecorder>(beside(csv, ".contacts.csv"), run));
+    add_recorder<ContactRecorder>(beside(csv, ".contacts.csv"), run, out);
+}
+
+std::vector<std::string> tables_beside(const std::string& csv, bool forces) {
+  std::vector<std::string> files = {beside(csv, ".events.csv")};
+  if (forces) files.push_back(beside(csv, ".contacts.csv"));
+  return files;
 }
 
 }  // namespace
 
-namespace formats {
+TETHER_FORMAT(csv, ".csv", "Table: energies, momenta, errors, states of the bodies", add_tables,
+              tables_beside)
 
-const Format& csv_format() {
-  static const Format format{"csv", ".csv",
-                             "Table: energies, momenta, errors, states of the bodies", add_tables,
-                             [](const std::string& csv, bool forces) {
-                               std::vector<std::string> files = {beside(csv, ".events.csv")};
-                               if (forces) files.push_back(beside(csv, ".contacts.csv"));
-                               return files;
-                             }};
-  return format;
-}
-
-}  // namespace formats
-
-}  // namespace tether::scene
+}  // namespace tether::scene::formats

@@ -61,6 +61,19 @@ struct Format {
   }
 };
 
+/// Adds a recorder of this kind.
+template <class Kind>
+void add_recorder(const std::string& given, const Beginning& run, Recorders& out) {
+  out.push_back(std::make_unique<Kind>(given, run));
+}
+
+/// Defines <name>_format(), which the list of formats asks for.
+#define TETHER_FORMAT(name, ...)                       \
+  const Format& name##_format() {                      \
+    static const Format format = {#name, __VA_ARGS__}; \
+    return format;                                     \
+  }
+
 /// Every format, in the order of CMakeLists.txt beside this file.
 const std::vector<const Format*>& all();
 

@@ -3,9 +3,6 @@
 
 namespace tether::scene::formats {
 
-const Format& state_format() {
-  static const Format format{"state", ".state", "Saved state: at checkpoints and at the end"};
-  return format;
-}
+TETHER_FORMAT(state, ".state", "Saved state: at checkpoints and at the end")
 
 }  // namespace tether::scene::formats

@@ -10,7 +10,7 @@
 #include "output/thinned.hpp"
 #include "picture/scene_drawing.hpp"
 
-namespace tether::scene {
+namespace tether::scene::formats {
 
 namespace {
 
@@ -34,7 +34,7 @@ struct Curve {
 
 class PictureRecorder : public Recorder {
  public:
-  PictureRecorder(const std::string& file, const formats::Beginning& run)
+  PictureRecorder(const std::string& file, const Beginning& run)
       : scene_(run.scene), file_(file), start_energy_(run.start_energy) {
     check_writable(file);
     bodies_ = std::min(scene_.bodies.size(), kManyBodies);
@@ -149,20 +149,9 @@ class PictureRecorder : public Recorder {
   Thinned<Instant> instants_{1024};
 };
 
-void add_picture(const std::string& svg, const formats::Beginning& run, formats::Recorders& out) {
-  out.push_back(std::make_unique<PictureRecorder>(svg, run));
-}
-
 }  // namespace
 
-namespace formats {
+TETHER_FORMAT(svg, ".svg", "Picture: the scene, its energies and errors",
+              add_recorder<PictureRecorder>)
 
-const Format& svg_format() {
-  static const Format format{"svg", ".svg", "Picture: the scene, its energies and errors",
-                             add_picture};
-  return format;
-}
-
-}  // namespace formats
-
-}  // namespace tether::scene
+}  // namespace tether::scene::formats

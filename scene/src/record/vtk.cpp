@@ -11,7 +11,7 @@
 #include "geometry/shape_type.hpp"
 #include "output/files.hpp"
 
-namespace tether::scene {
+namespace tether::scene::formats {
 
 namespace {
 
@@ -99,7 +99,7 @@ std::string frames_of(const std::string& vtk) {
 
 class VtkRecorder : public Recorder {
  public:
-  VtkRecorder(const std::string& file, const formats::Beginning& run)
+  VtkRecorder(const std::string& file, const Beginning& run)
       : file_(film_of(file)),
         folder_(frames_of(file)),
         forces_(run.scene.output.forces),
@@ -305,29 +305,15 @@ class VtkRecorder : public Recorder {
   std::vector<std::vector<Part>> meshes_;
 };
 
-void add_film(const std::string& vtk, const formats::Beginning& run, formats::Recorders& out) {
-  out.push_back(std::make_unique<VtkRecorder>(vtk, run));
+std::vector<std::string> folders_of(const std::string& vtk, bool) { return {frames_of(vtk)}; }
+bool is_frame(const std::string& path) {
+  const auto end = std::filesystem::path(path).extension();
+  return end == ".vtp" || end == ".pvtp";
 }
 
 }  // namespace
 
-namespace formats {
+TETHER_FORMAT(vtk, ".pvd", "Film for ParaView (.pvd, with a folder of .vtp)",
+              add_recorder<VtkRecorder>, folders_of, film_of, is_frame)
 
-const Format& vtk_format() {
-  static const Format format{
-      "vtk",
-      ".pvd",
-      "Film for ParaView (.pvd, with a folder of .vtp)",
-      add_film,
-      [](const std::string& vtk, bool) { return std::vector<std::string>{frames_of(vtk)}; },
-      film_of,
-      [](const std::string& path) {
-        const auto end = std::filesystem::path(path).extension();
-        return end == ".vtp" || end == ".pvtp";
-      }};
-  return format;
-}
-
-}  // namespace formats
-
-}  // namespace tether::scene
+}  // namespace tether::scene::formats
