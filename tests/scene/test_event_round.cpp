@@ -152,7 +152,7 @@ TEST_CASE("event: the second derivative of round contacts is that of their gap")
   const Round disc{{0, 0.1, 0}, Vector3d(0.4, 0.4, 0).asDiagonal(), 0, Vector3d::UnitZ()};
   const Round other{{0, 0, 0.1}, Vector3d(0.6, 0.7, 0.2).asDiagonal(), 0.05, Vector3d::Zero()};
   const Segment line{{-1, 0.2, 0}, Vector3d(1, 0.3, 0.2).normalized(), 2, 0.1, {}};
-  const PlaneFeature plane{{0, 0, 0.1}, Vector3d(0.1, 0.2, 1).normalized(), {}};
+  const Face plane{{0, 0, 0.1}, Vector3d(0.1, 0.2, 1).normalized(), {}};
   const std::vector<std::function<Touch(const Frame<double>&, const Frame<double>&)>> looks = {
       [&](const auto& a, const auto& b) {
         return RoundOnPlane{oval, plane, 0}.touch(a, b);

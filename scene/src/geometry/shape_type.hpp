@@ -7,6 +7,7 @@
 #include <tether/scene/scene.hpp>
 #include <variant>
 
+#include "bounds.hpp"
 #include "toml/fields.hpp"
 
 namespace tether::scene {
@@ -32,6 +33,13 @@ struct Segment {
 struct Face {
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
   std::vector<std::pair<Eigen::Vector3d, double>> border;
+
+  /// How far a point in these axes is inside the border, m.
+  double margin(const Eigen::Vector3d& local) const {
+    double least = kInfinity;
+    for (const auto& [outward, limit] : border) least = std::min(least, limit - outward.dot(local));
+    return least;
+  }
 };
 
 /// The points at + shape v, |v| <= 1, with a ball of `radius` around each: an ellipsoid (shape of

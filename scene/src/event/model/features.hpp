@@ -78,27 +78,15 @@ inline Touch apart(const Jet<double>& d, double radius_first, double radius) {
   return t;
 }
 
+using scene::Face;
 using scene::Knob;
 using scene::Round;
 using scene::Segment;
 
-/// The half-space n.(x - b) <= 0 of a body, or a face of it: where all border.x <= limit.
-struct PlaneFeature {
-  Vector3d at = Vector3d::Zero(), normal = Vector3d::UnitZ();
-  std::vector<std::pair<Vector3d, double>> border;  ///< in the axes of the body
-
-  /// How far a point in these axes is inside the border, m.
-  double margin(const Vector3d& local) const {
-    double least = kInfinity;
-    for (const auto& [outward, limit] : border) least = std::min(least, limit - outward.dot(local));
-    return least;
-  }
-};
-
 /// A point of the first body with a radius, on a plane or face of the second one.
 struct PointOnPlane {
   Knob first;
-  PlaneFeature plane;
+  Face plane;
 
   Touch touch(const Frame<double>& A, const Frame<double>& B) const {
     const Jet<double> c = mechanics::point<2>(A, first.at), n = direction<2>(B, plane.normal);
@@ -258,7 +246,7 @@ class Support {
 /// bordered by a circle.
 struct RoundOnPlane {
   Round first;
-  PlaneFeature plane;
+  Face plane;
   double disc = 0;  ///< radius of its border, about plane.at; 0: none
 
   Touch touch(const Frame<double>& A, const Frame<double>& B) const;

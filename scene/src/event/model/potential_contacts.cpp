@@ -14,8 +14,6 @@ namespace {
 constexpr std::size_t kMostContacts = 16000;
 constexpr std::size_t kMostMoving = 100;
 
-PlaneFeature plane_of(const Face& face) { return {face.at, face.normal, face.border}; }
-
 /// The contacts of a pair of shapes, one after the other.
 class Contacts {
  public:
@@ -36,12 +34,12 @@ class Contacts {
   /// only.
   void put_points(const Outline& a, const Outline& b) {
     for (const Knob& knob : a.knobs) {
-      for (const Face& face : b.faces) put(PointOnPlane{knob, plane_of(face)});
+      for (const Face& face : b.faces) put(PointOnPlane{knob, face});
       for (const Segment& s : b.segments)
         if (knob.radius + s.radius > 0) put(PointOnLine{knob, s});
     }
   }
-  void put_on_plane(const Outline& a, const PlaneFeature& plane) {
+  void put_on_plane(const Outline& a, const Face& plane) {
     for (const Knob& knob : a.knobs) put(PointOnPlane{knob, plane});
     for (const Round& round : a.rounds) put(RoundOnPlane{round, plane, 0});
   }
@@ -49,13 +47,13 @@ class Contacts {
   /// Pairs of the round features of the first with all features of the second but round ones.
   void put_rounds(const Outline& a, const Outline& b) {
     for (const Round& round : a.rounds) {
-      for (const Face& face : b.faces) put(RoundOnPlane{round, plane_of(face), 0});
-      for (const End& end : b.ends) put(RoundOnPlane{round, plane_of(end.plane), end.radius});
+      for (const Face& face : b.faces) put(RoundOnPlane{round, face, 0});
+      for (const End& end : b.ends) put(RoundOnPlane{round, end.plane, end.radius});
       for (const Segment& s : b.segments) put(RoundOnLine{round, s});
     }
     for (const Knob& knob : a.knobs) {
       const Round point{knob.at, Matrix3d::Zero(), knob.radius, Vector3d::Zero()};
-      for (const End& end : b.ends) put(RoundOnPlane{point, plane_of(end.plane), end.radius});
+      for (const End& end : b.ends) put(RoundOnPlane{point, end.plane, end.radius});
       for (const Round& round : b.rounds)
         if (!round.is_disc()) put(RoundOnRound{point, round});
       if (knob.radius > 0)
@@ -103,8 +101,8 @@ void add(const Shape& a, const Outline& of_a, const Shape& b, const Outline& of_
   FeaturePair bodies = of_bodies;
   if (a.kind != ShapeKind::plane && !on_plane) bodies.reach = of_a.reach() + of_b.reach();
   Contacts contacts(bodies, out), swapped = contacts.swapped();
-  if (on_plane) return contacts.put_on_plane(of_a, plane_of(of_b.faces[0]));
-  if (a.kind == ShapeKind::plane) return swapped.put_on_plane(of_b, plane_of(of_a.faces[0]));
+  if (on_plane) return contacts.put_on_plane(of_a, of_b.faces[0]);
+  if (a.kind == ShapeKind::plane) return swapped.put_on_plane(of_b, of_a.faces[0]);
   contacts.put_points(of_a, of_b);
   swapped.put_points(of_b, of_a);
   contacts.put_points_and_edges(of_a, of_b);
