@@ -31,12 +31,13 @@ double part_of_tolerance(double tolerance, double part) {
 
 // From a bounce on: an error of the height is one of the time of the next impact, over its speed.
 double flight_tolerance(double tolerance, double speed) {
-  const bool tight = wanted_tolerance(tolerance) < 1e-11;
+  const bool tight = wanted_tolerance(tolerance) < 1e-11;  // others stay as they are
   return tight ? part_of_tolerance(tolerance, speed) : kInfinity;
 }
 
 // To an impact with this speed that does not end a bounce. Errors of gaps are those of its time,
-// over the speed; what the phase before has left is a part of the tolerance.
+// over the speed; what the phase before has left is a part of the tolerance. From 0.04 on, in the
+// units of the model, the tolerance itself serves.
 double graze_tolerance(double tolerance, double speed) {
   return part_of_tolerance(tolerance, speed / 0.04);
 }
@@ -214,7 +215,7 @@ void Driver::find_excess(const std::function<double()>& excess) {
 // decides whether it is an impact. Returns whether it does.
 bool Driver::repeat_phase() {
   double tolerance = std::max(watcher_.deciding_tolerance(), kLeastInFlight);
-  if (next_ && next_->what == Watch::gap && !next_->was_near) {
+  if (next_ && next_->what == Watch::gap && next_->start == Start::apart) {
     double rate = 0;
     model_.set(phase_->start() + next_->time, next_->y.data());
     model_.gap(next_->contact, rate);
@@ -334,6 +335,7 @@ void Driver::turn_slips() {
     const int i = motion_.closed()[k];
     if (motion_.modes()[at(i)].mode != Mode::slide) continue;
     const VectorXd s = motion_.slip(static_cast<int>(k));
+    // The direction of less is that of errors.
     if (s.norm() > 10 * bands().slip(i)) motion_.turn(i, s.normalized());
   }
 }
@@ -419,8 +421,7 @@ std::string Driver::contradiction() const {
   }
   const double unit = model_.length_unit();
   std::string text = "the state cannot be moved onto joints and closed contacts";
-  // Both sides of a clearance, say.
-  // Gaps that are no rounding.
+  // Both sides of a clearance, say; a hundredth of a band is more than rounding.
   if (gap > 0.01 * band)
     text += fmt::format(
         ": at this tolerance gaps of up to {:.3g} m count as closed, and of the {} contacts that "

@@ -20,12 +20,12 @@ using ConstraintRows =
 /// an unknown: energy minus work is kept.
 class KeptInvariants {
  public:
-  /// `work` is the index of the unknown in y. Throws std::invalid_argument, naming what changes an
-  /// invariant from outside.
+  /// `work` is the index of the unknown in y, where there is one. Throws std::invalid_argument,
+  /// naming what changes an invariant from outside.
   KeptInvariants(const Scene& scene, const MovingBodies& bodies, const Forces& forces, int work);
 
-  int count() const { return static_cast<int>(kept_.size()); }
-  bool has_work() const { return has_work_; }
+  int count() const { return static_cast<int>(rows_.size()); }
+  bool has_work() const { return work_ >= 0; }
   /// Values at the start, to save and to set.
   std::vector<double>& kept() { return kept_; }
   /// Keeps those of the state that is set from now on.
@@ -39,12 +39,18 @@ class KeptInvariants {
   std::vector<double> units(const Units& units) const;
 
  private:
+  /// Energy less work, or a component of momentum or of angular momentum about the origin.
+  struct Row {
+    InvariantKind kind;
+    Vector3d along;
+  };
+  void put_gradient(const Row& of, Eigen::Ref<Eigen::RowVectorXd> row) const;
+
   const MovingBodies& bodies_;
   const Forces& forces_;
-  int work_;
-  bool has_work_ = false, energy_ = false, momentum_ = false;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> axes_;  // of angular momentum about the origin
-  Vector3d steady_force_ = Vector3d::Zero();       // momentum grows by it
+  int work_ = -1;
+  std::vector<Row> rows_;
+  Vector3d steady_force_;  // momentum grows by it
   std::vector<double> kept_;
 };
 

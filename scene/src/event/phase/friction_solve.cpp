@@ -15,8 +15,8 @@ using linalg::at;
 
 namespace {
 
-constexpr double kSolve = 1e-12;
-constexpr double kFarAbove = 1e5;
+constexpr double kSolve = 1e-12;   // tolerance of the contact library
+constexpr double kFarAbove = 1e5;  // S over all accelerations
 
 /// The cones of a problem, and their rows in it. Those without a bound, and those of contacts that
 /// the joints lock, are left out.
@@ -33,6 +33,7 @@ struct Product {
         cones.push_back(Cone::bounded(p.bound));
         take(p);
       }
+      // Less than 1e-12 of the largest mobility is rounding: joints lock it.
       if (!p.has_normal() || !(problem.A(p.first, p.first) > 1e-12 * largest)) continue;
       take(p);
       double length[2] = {0, 0};  // of the moments about the normal, across it
@@ -101,6 +102,7 @@ class ProductSolver {
         last_.size() > 0 ? solver_.solve(cones, last_) : solver_.solve(cones);
     last_ = found.impulses;
     out.error = found.error;
+    // An error of 1e-8 is enough for the regimes, by which sharpen() finds the answer.
     out.solved = found.status == contact::Status::solved ||
                  found.status == contact::Status::round_off ||
                  (found.error < 1e-8 && found.status != contact::Status::infeasible);
@@ -167,7 +169,7 @@ bool settle(const std::vector<bool>& closed, double none, const FrictionProblem&
 /// `with_slips`: the problem with S.
 bool solve_compliant(const std::vector<bool>& closed, double none, FrictionProblem with_slips,
                      const FrictionProblem& problem, const Regimes& held, FrictionSolution& out) {
-  ProductSolver solver(3e7);
+  ProductSolver solver(3e7);  // operations, of each of some problems
   FrictionSolution answer;
   for (double part = 1; part >= 1e-6; part *= 0.1) {
     with_slips.A = problem.A;

@@ -11,8 +11,8 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kWeakened = 0.3;
-constexpr double kAhead = 1e-5;  // s in the units of the model
+constexpr double kWeakened = 0.3;  // of the least joint row, before rows are chosen anew
+constexpr double kAhead = 1e-5;    // s in the units of the model
 
 /// At most 1; a power of 2, so that rounding does not show in it.
 double part_of(double length) {
@@ -131,11 +131,6 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   sharing_.clear();
   for (std::size_t k = 0; k < closed_.size(); ++k)
     if (model_.shares_bound(closed_[k])) sharing_.push_back(k);
-  works_ = model_.does_work();
-  for (std::size_t k = 0; k < closed_.size(); ++k)
-    works_ = works_ || is_bounded(k) ||
-             ((!sticks(k) || model_.law(closed_[k]).kind == ContactLaw::Kind::conveying) &&
-              model_.law(closed_[k]).friction > 0);
   R_.setZero(rows_, nu_);
   C_.setZero(nu_, rows_);
   r_.setZero(rows_);
@@ -145,8 +140,19 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   if (rows_ > 0) islands_.choose(R_, C_, model_.velocity_block());
   VectorXd y_rate(size());
   rate(t, y.data(), y_rate.data());
-  // The energy of bodies at rest is known to rounding only and does not determine the state.
-  keeps_energy_ = rank < nu_ && a_.norm() + u_.norm() > 1e-3;
+  choose_energy_row(rank);
+}
+
+void Motion::choose_energy_row(int rank) {
+  bool works = model_.does_work();
+  for (std::size_t k = 0; k < closed_.size(); ++k)
+    works = works || is_bounded(k) ||
+            ((!sticks(k) || model_.law(closed_[k]).kind == ContactLaw::Kind::conveying) &&
+             model_.law(closed_[k]).friction > 0);
+  // The energy of bodies at rest, slower than 1e-3 in the units of the model, is known to rounding
+  // only and does not determine the state.
+  const bool moves = rank < nu_ && a_.norm() + u_.norm() > 1e-3;
+  energy_row_ = !moves ? EnergyRow::none : works ? EnergyRow::less_work : EnergyRow::energy;
 }
 
 double Motion::margin_rate(double t, const VectorXd& y, int contact) {
@@ -251,7 +257,7 @@ int Motion::choose_rows() {
   rates_in_use_.clear();
   rate_place_.assign(index(rows_), -1);
   row_scale_.setOnes(rows_);
-  hyperstatic_ = false;
+  spare_rows_ = 0;
   if (rows_ == 0) return 0;
   MC_ = R_.transpose();
   model_.divide_by_mass(MC_);
@@ -277,7 +283,7 @@ int Motion::choose_rows() {
     rate_place_[index(row)] = static_cast<int>(rates_in_use_.size());
     rates_in_use_.push_back(row);
   }
-  hyperstatic_ = independent.rank() - rank_of_joints < rows_ - joints_;
+  spare_rows_ = rows_ - joints_ - (independent.rank() - rank_of_joints);
   return independent.rank();
 }
 
@@ -316,6 +322,7 @@ void Motion::find_bounds() {
 void Motion::prepare(double t, const double* y) {
   set(t, y);
   gather();
+  // A contact's kinematics take some 1000 operations.
   work_done_ += 1000 * static_cast<double>(closed_.size() + 1) + 4.0 * rows_ * (nu_ + rows_);
   model_.forces(h_);
   if (!sharing_.empty()) share_bounds();
@@ -389,6 +396,7 @@ bool Motion::forces_are_lawful() const {
   }
   const VectorXd left = row_scale_.cwiseProduct(R_ * a_ + r_);
   const double scale = row_scale_.cwiseProduct(r_).norm() + a_.norm();
+  // Rounding of rows is below 1e-9 of their size.
   return left.size() == 0 ||
          left.cwiseAbs().maxCoeff() <= std::max(1e-9, bands_.of_accelerations()) * scale;
 }
@@ -408,7 +416,7 @@ std::vector<VectorXd> Motion::contact_forces() {
     lawful =
         lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(tangents_).norm() >= least;
   }
-  if (lawful || !hyperstatic_) return out;
+  if (lawful || !is_hyperstatic()) return out;
   ContactRows rows(model_, closed_);
   const AccelerationSolution answer =
       solve_accelerations(rows, slides(), bands_.of_accelerations());
@@ -443,7 +451,7 @@ VectorXd Motion::friction_force(int closed) const {
 
 int Motion::constraint_count() const {
   return static_cast<int>(positions_in_use_.size() + rates_in_use_.size()) + model_.own_rows() +
-         (keeps_energy_ ? 1 : 0);
+         (energy_row_ != EnergyRow::none ? 1 : 0);
 }
 
 void Motion::keep_energy_of(double t, const VectorXd& y) {
@@ -493,7 +501,7 @@ void Motion::constraints(double t, const double* y, double* g) {
   for (const int row : rates_in_use_) *g++ = rates[row];
   model_.own_values(g);
   g += model_.own_rows();
-  if (keeps_energy_) *g = model_.energy() - y[work()] - kept_energy_;
+  if (energy_row_ != EnergyRow::none) *g = model_.energy() - y[work()] - kept_energy_;
 }
 
 // Derivatives of the contacts of the body whose coordinate j is changed in the state set.
@@ -530,15 +538,14 @@ void Motion::constraint_gradient(double t, const double* y,
   const int first_rate = out;
   for (const int row : rates_in_use_) C.row(out++).segment(nq_, nu_) = R_.row(row);
   for (int k = 0; k < model_.own_rows(); ++k) model_.own_gradient(k, C.row(out++).data());
-  if (keeps_energy_) {
+  if (energy_row_ != EnergyRow::none)
     model_.energy_gradient(C.row(out).data(), C.row(out).data() + nq_);
-    if (works_) C(out, work()) = -1;
-  }
+  if (energy_row_ == EnergyRow::less_work) C(out, work()) = -1;
   if (rates_in_use_.empty() || u_.isZero(0)) return;
   // Rates by coordinates: differences, which Newton's moves onto the rows need not be better than.
   VectorXd near = Eigen::Map<const VectorXd>(y, size());
   for (int j = 0; j < nq_; ++j) {
-    const double step = 1e-7 * std::max(1.0, std::abs(y[j]));
+    const double step = 1e-7 * std::max(1.0, std::abs(y[j]));  // about the root of rounding
     near[j] = y[j] + step;
     set(t, near.data());
     near[j] = y[j];

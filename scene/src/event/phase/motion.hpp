@@ -74,7 +74,7 @@ class Motion {
   const std::vector<ContactMode>& modes() const { return modes_; }
   const std::vector<int>& closed() const { return closed_; }
   /// Some closed contacts share their forces in more than one way.
-  bool is_hyperstatic() const { return hyperstatic_; }
+  bool is_hyperstatic() const { return spare_rows_ > 0; }
   /// A sliding contact has turned to this direction.
   void turn(int contact, const VectorXd& direction) {
     modes_[index(contact)].direction = direction;
@@ -118,7 +118,7 @@ class Motion {
                            Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   /// Energy less work is that of this state from now on.
   void keep_energy_of(double t, const VectorXd& y);
-  void leave_energy_free() { keeps_energy_ = false; }  ///< until modes are chosen again
+  void leave_energy_free() { energy_row_ = EnergyRow::none; }  ///< until modes are chosen again
   void keep_energy(double value) { kept_energy_ = value; }
   double kept_energy() const { return kept_energy_; }
   double energy() const { return model_.energy(); }  ///< of the state that was evaluated last
@@ -155,6 +155,7 @@ class Motion {
   void differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
                               Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   int choose_rows();
+  void choose_energy_row(int rank);
   void choose_joints();
   void evaluate_joints();
 
@@ -171,9 +172,9 @@ class Motion {
   double least_joint_row_ = 1;  // what a row in use added to the others, of its length
   std::vector<int> positions_in_use_, rates_in_use_;  // rows of the projection
   std::vector<int> rate_place_;                       // of each row in rates_in_use_, or -1
-  bool hyperstatic_ = false;
+  int spare_rows_ = 0;  // of closed contacts: those that the others imply
   double kept_energy_ = 0;
-  bool keeps_energy_ = true, works_ = false;
+  enum class EnergyRow : unsigned char { none, energy, less_work } energy_row_ = EnergyRow::energy;
 
   VectorXd u_, h_, a_, lambda_, r_;
   VectorXd joint_g_, joint_rate_, joint_rest_, row_scale_;

@@ -1,6 +1,7 @@
 // Tether: one smooth phase in the hands of IDA and the projection. SPDX-License-Identifier:
 // BSD-3-Clause
 #include "phase.hpp"
+#include "friction_solve.hpp"
 
 #include <fmt/format.h>
 #include <sunmatrix/sunmatrix_dense.h>
@@ -28,7 +29,7 @@ Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const 
   const VectorXd id = VectorXd::Ones(N);
   const IdaSession::Start start{0, y, yp, id};
   session_.emplace(context_, start, *this, max_step);
-  const double h = first_step(tolerance, 0.1, sizes_, start,
+  const double h = first_step(tolerance, 0.1, sizes_, start,  // at most a tenth of its time unit
                               [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
                                 motion.rate(start_ + at, ahead.data(), rate_ahead.data());
                               });
@@ -98,7 +99,7 @@ void Phase::differentiate(double t, const double* y) {
   slope_.setZero(N, N);
   for (int j = 0; j < N; ++j) {
     if (j == motion_.work()) continue;
-    double step = 1e-7 * std::max(sizes_[j], std::abs(slope_at_[j]));
+    double step = 1e-7 * std::max(sizes_[j], std::abs(slope_at_[j]));  // the root of rounding
     if (j >= motion_.coordinates()) step = std::min(step, longest);
     near[j] = slope_at_[j] + step;
     motion_.rate(start_ + t, near.data(), near_rate.data());
@@ -140,7 +141,8 @@ bool Phase::has_weak_rows() const {
   return motion_.other_joint_rows_are_better(start_ + end_, y);
 }
 
-// Newton's shortest moves; few, since only what an event left is mended.
+// Newton's shortest moves, until they are a thousandth of the tolerance; few, since only what an
+// event left is mended.
 bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y) {
   const int m = motion.constraint_count();
   if (m == 0) return true;
@@ -153,7 +155,7 @@ bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd&
     if (!g.allFinite()) return false;
     C.setZero();
     motion.constraint_gradient(t, y.data(), C);
-    linalg::LeastSquares factor(1e-11);
+    linalg::LeastSquares factor(kDependent);
     factor.factor(C * sizes.asDiagonal());
     const VectorXd move = factor.solve(g);
     y -= sizes.cwiseProduct(move);

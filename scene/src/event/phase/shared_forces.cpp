@@ -116,6 +116,7 @@ class HeldRows {
     if (is_lawful(x_)) return true;
     if (!several()) return false;
     VectorXd moved = x_, inside, off = VectorXd::Zero(x_.size());
+    // 0.99 = 1 / (1 + c): the term c |z|^2 / 2 that makes z short.
     for (int k = 0; k < 1000; ++k) {
       inside = moved + off;
       project(inside);
@@ -236,6 +237,7 @@ FrictionSolution share_forces(const FrictionProblem& problem, Regimes& regimes) 
     const Regimes now = regimes;
     before = off;
     off = turn(problem, out, regimes);
+    // Directions no longer come nearer to those of w.
     if (off == 0 || (pass > 0 && off <= none && off >= 0.9 * before)) {
       regimes = now;
       break;
@@ -272,8 +274,8 @@ void sharpen(const FrictionProblem& problem, FrictionSolution& answer) {
       turned = std::max(turned, (slip.normalized() - regimes.directions[i]).norm());
       regimes.directions[i] = slip.normalized();
     }
-    if (turned < 1e-15) break;
-    if (turned > 1) return;  // it does not settle: the library's answer stands
+    if (turned < 1e-15) break;  // rad, rounding
+    if (turned > 1) return;     // rad: it does not settle, the library's answer stands
   }
   // Still an answer of the law?
   const double force = answer.x.cwiseAbs().maxCoeff(), speed = problem.b.cwiseAbs().maxCoeff();

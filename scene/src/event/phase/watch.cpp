@@ -10,8 +10,8 @@ namespace tether::scene::event {
 
 namespace {
 
-constexpr double kFewOfBand = 0.02;
-constexpr int kParts = 32;
+constexpr double kFewOfBand = 0.02;  // the part of a band at which a zero counts as located
+constexpr int kParts = 32;           // of a step in which bodies may pass each other
 constexpr double kFasterWithin = 2;  // a step, than at its ends
 constexpr double kKnown = 5;         // errors of gaps, in the tolerance of the phase
 // Errors of accelerations: by the contact library's tolerance, and by the large slip S.
@@ -50,24 +50,24 @@ double kink_between(const F& f, double a, double b, double fb, double near, doub
 void Watcher::begin(double t, const VectorXd& y, const std::vector<bool>& leaving) {
   functions_.clear();
   force_ = 0;
-  const auto add = [&](Watch what, int contact, int closed, bool leaves) {
-    functions_.push_back({what, contact, closed, leaves});
+  const auto add = [&](Watch what, int contact, int closed, Start start = Start::apart) {
+    functions_.push_back({what, contact, closed, start});
   };
   const std::vector<int>& closed = motion_.closed();
   for (int i = 0; i < motion_.model().contacts(); ++i)
     if (motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::open &&
         motion_.model().law(i).has_normal())
-      add(Watch::gap, i, -1, leaving[static_cast<std::size_t>(i)]);
+      add(Watch::gap, i, -1, leaving[static_cast<std::size_t>(i)] ? Start::leaving : Start::apart);
   for (std::size_t k = 0; k < closed.size(); ++k) {
     const int i = closed[k], place = static_cast<int>(k);
     const bool single = !motion_.is_hyperstatic();
-    if (single && motion_.model().law(i).has_normal()) add(Watch::normal_force, i, place, false);
+    if (single && motion_.model().law(i).has_normal()) add(Watch::normal_force, i, place);
     const bool stuck = motion_.modes()[static_cast<std::size_t>(i)].mode == Mode::stick;
-    if (stuck && single) add(Watch::cone, i, place, false);
-    if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place, false);
-    if (!stuck && motion_.model().holding(i) > 0) add(Watch::slip, i, place, false);
+    if (stuck && single) add(Watch::cone, i, place);
+    if (std::isfinite(motion_.model().margin(i))) add(Watch::border, i, place);
+    if (!stuck && motion_.model().holding(i) > 0) add(Watch::slip, i, place);
   }
-  if (motion_.is_hyperstatic()) add(Watch::support, -1, -1, false);
+  if (motion_.is_hyperstatic()) add(Watch::support, -1, -1);
   evaluate(t, y, 0);
   for (Function& f : functions_) arm(f);
 }
@@ -76,7 +76,8 @@ void Watcher::arm(Function& f) {
   const bool gap = f.what == Watch::gap;
   if (f.is(State::far)) return;
   f.state = gap && f.value < -bands().gap(f.contact) ? State::beside : State::waiting;
-  f.was_near = gap && std::abs(f.value) <= bands().gap(f.contact);
+  if (gap && f.start != Start::leaving)
+    f.start = std::abs(f.value) <= bands().gap(f.contact) ? Start::near : Start::apart;
   // A border is come in over.
   if ((gap || f.what == Watch::border) && f.value < 0 && f.is(State::waiting)) {
     f.level = f.value;
@@ -89,7 +90,7 @@ void Watcher::arm(Function& f) {
 double Watcher::band(const Function& f) const {
   switch (f.what) {
     case Watch::gap:
-      return f.leaving ? 0 : bands().gap(f.contact);
+      return f.start == Start::leaving ? 0 : bands().gap(f.contact);
     case Watch::border:
       return bands().gap(f.contact);
     case Watch::support:
@@ -140,6 +141,7 @@ double Watcher::support() {
     if (p.has_normal()) largest = std::max(largest, std::abs(answer.contacts.w[p.first]));
     if (slides[k].size() == 0) largest = std::max(largest, p.slip_of(answer.contacts.w).norm());
   }
+  // The library's error is a part of its velocities; w may be off by a multiple of it.
   const double noise = std::max(sliding ? kSlidingNoise : kNoise, 100 * answer.contacts.error);
   support_band_ = std::max(bands().of_accelerations(), noise) * answer.scale;
   return support_band_ - largest;
@@ -213,6 +215,7 @@ double Watcher::turn(Phase& phase, Function f, double& when) {
     value(f, phase.start() + time, y_);
     return f.slope;
   };
+  // A gap is flat where it turns: the time need not be exact to rounding.
   when = zero_between(slope_at, a, before, b, after, 1e-9 * (b - a));
   phase.at(when, y_);
   return value(f, phase.start() + when, y_);
@@ -230,7 +233,7 @@ Zero Watcher::locate(Phase& phase, Function f) {
   if (fa <= 0 && f.what == Watch::gap && slope_before > 0 && slope_after < 0)
     fa = turn(phase, f, a);
   Zero zero{f.what, f.contact, a, {}};
-  const double resolution = 4e-16 * b;
+  const double resolution = 4e-16 * b;  // rounding of times
   if (f.what == Watch::support) {
     zero.time = fa > 0 ? kink_between(at, a, b, fb, kFewOfBand * support_band_, resolution) : a;
     phase.projected_at(zero.time, zero.y);
@@ -262,7 +265,7 @@ Zero Watcher::locate(Phase& phase, Function f) {
 // Accelerations of contacts that can no longer rest begin at zero and grow; by their rate where
 // they leave the band. They jump where friction falls as contacts slip, which is when it happens.
 double Watcher::lag(Phase& phase, Function f, double time) {
-  const double later = time + 0.01 * (phase.step_end() - time);
+  const double later = time + 0.01 * (phase.step_end() - time);  // for a difference quotient
   if (!(later > time)) return 0;
   VectorXd y;
   phase.projected_at(time, y);
@@ -288,7 +291,8 @@ double Watcher::way(Phase& phase, const VectorXd& at_end) {
 bool Watcher::is_hit(Phase& phase, const Function& f) {
   bool hit = f.value < (f.is(State::armed) ? 0 : -band(f));
   // Else it is on its way out; its first gaps are lost in rounding.
-  const bool from_zero = !f.is(State::armed) || (f.leaving && f.value > -bands().gap(f.contact));
+  const bool from_zero =
+      !f.is(State::armed) || (f.start == Start::leaving && f.value > -bands().gap(f.contact));
   if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
   if (hit || !may_dip(f)) return hit;
   return dips(phase, f);
@@ -304,6 +308,7 @@ bool Watcher::dips(Phase& phase, const Function& f) {
   const double known = kKnown * part * phase.tolerance();
   if (least < -known || least > known) return least < 0;
   const double turns = (f.slope - f.slope_before) / (end_ - begin_);
+  // Approaches of five bands are told from none.
   const double tells = 0.5 * std::pow(5 * bands().approach(f.contact), 2) / turns;
   const double tolerance = tells / (kKnown * part);
   if (tolerance < undecided_.tolerance) undecided_ = {when, tolerance};
@@ -315,6 +320,7 @@ bool Watcher::dips(Phase& phase, const Function& f) {
 // the part that has the zero.
 bool Watcher::is_hit_between(Phase& phase, Function& f) {
   const double begin = phase.step_begin(), length = phase.step_end() - begin;
+  // A quarter of both bodies' size is passed in a step.
   if (f.what != Watch::gap ||
       !(std::max(f.passes_before, f.passes) * kFasterWithin * length > 0.25))
     return false;
@@ -358,7 +364,7 @@ std::optional<Zero> Watcher::first_zero(Phase& phase) {
     }
     Zero zero = locate(phase, part);
     if (f.what == Watch::support) zero.lag = lag(phase, f, zero.time);
-    zero.was_near = f.was_near;
+    zero.start = f.start;
     if (f.what == Watch::gap &&
         motion_.passes_border(phase.start() + zero.time, zero.y, f.contact)) {
       f.state = State::beside;

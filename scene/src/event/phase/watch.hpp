@@ -19,13 +19,17 @@ namespace tether::scene::event {
 
 enum class Watch : unsigned char { gap, normal_force, cone, slip, border, support };
 
+/// Gaps when their phase begins: beyond their band; within it, as between two bounces; and those of
+/// bodies that move apart though their gap is zero.
+enum class Start : unsigned char { apart, near, leaving };
+
 /// The first zero in a step.
 struct Zero {
   Watch what = Watch::gap;
   int contact = -1;
-  double time = 0;        ///< since the start of the phase
-  VectorXd y;             ///< there, on the constraints
-  bool was_near = false;  ///< a gap within its band when the phase began, as between two bounces
+  double time = 0;  ///< since the start of the phase
+  VectorXd y;       ///< there, on the constraints
+  Start start = Start::apart;
   double lag = 0;  ///< how much earlier the function was zero that is told by its band only, s
 };
 
@@ -33,7 +37,7 @@ class Watcher {
  public:
   explicit Watcher(Motion& motion) : motion_(motion) {}
 
-  /// A phase begins at (t, y). `leaving`: contacts that move apart though their gaps are zero.
+  /// A phase begins at (t, y). `leaving`: contacts that are Start::leaving.
   void begin(double t, const VectorXd& y, const std::vector<bool>& leaving);
   /// Returns the first event in the last step of the phase, if there is one.
   std::optional<Zero> first_zero(Phase& phase);
@@ -45,7 +49,7 @@ class Watcher {
   struct Function {
     Watch what;
     int contact, closed;  // closed: place among the closed contacts
-    bool leaving, was_near = false;
+    Start start;
     /// far: a gap of bodies that are far apart, not evaluated; beside: a gap that is negative
     /// beside its feature, no contact; waiting: to leave its band.
     enum class State { far, beside, waiting, armed } state = State::waiting;
