@@ -171,7 +171,7 @@ void forces(const double* y, double* f) {
   }
 }
 
-// Of the left contact and the right one: distances, their rates, tangency of each.
+// Distances of the left contact and of the right one, their rates, tangency of each.
 template <class S>
 void contact_rows(const S* y, S* g) {
   const int places[2] = {kLeft, kRight};
