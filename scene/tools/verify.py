@@ -34,7 +34,11 @@ class V(tuple):
 
 
 NONE = V((0, 0, 0))
-State = collections.namedtuple("State", "x q v w time a alpha", defaults=(0, NONE, NONE))  # of a body, world axes; a, alpha of an instant
+
+
+class State(collections.namedtuple("State", "x q v w time a alpha", defaults=(0, NONE, NONE))):
+    """Of a body, in world axes; a, alpha of an instant."""
+    power = lambda s, load: load.force @ s.v + load.moment @ s.w  # of a force and a moment
 
 
 def rotation(v):
@@ -203,24 +207,19 @@ class Judge:
 
     def loads(self, dt, contacts=True):
         """Of each body the sums of impulses, of their moments about its centre, and of their sizes; of an instant (dt 1) forces."""
-        out = collections.defaultdict(lambda: (NONE, NONE, 0.0, 0.0))
-
-        def add(k, x, force, moment, at=None):
-            force, moment = force * x, (moment + ((at - self.states[k].x) ^ force) if at else moment) * x
-            out[k] = tuple(map(operator.add, out[k], (force, moment, abs(force), abs(moment))))
-        for k in self.to:
-            add(k, self.bodies[k].mass * dt, self.engine.gravity, NONE)
-        for p in self.told["push"]:
-            add(p.k, 1, p.force, p.moment)
+        acts = [(k, self.engine.gravity, NONE, None, self.bodies[k].mass * dt) for k in self.to]
+        acts += [(p.k, p.force, p.moment, None, 1) for p in self.told["push"]]
+        acts += [(on.k, on.force, on.moment, None, law.x) for law in self.told["law"] for on in self.told["on", law.k]]
         for p in self.told["pull"]:
             row = self.rows[p.row]
             _, *unit = row_of(row, self.states[row.first], self.states[row.second], self.when)
-            add(row.first, p.x, *unit), add(row.second, -p.x, *unit)
-        for law in self.told["law"]:
-            for on in self.told["on", law.k]:
-                add(on.k, law.x, on.force, on.moment)
+            acts += [(row.first, *unit, p.x), (row.second, *unit, -p.x)]
         for c in self.told["contact"] if contacts else ():
-            add(c.first, 1, c.x, c.moment, c.on), add(c.second, -1, c.x, c.moment, c.on_2)
+            acts += [(c.first, c.x, c.moment, c.on, 1), (c.second, c.x, c.moment, c.on_2, -1)]
+        out = collections.defaultdict(lambda: (NONE, NONE, 0.0, 0.0))
+        for k, force, moment, at, x in acts:
+            force, moment = force * x, (moment + ((at - self.states[k].x) ^ force) if at else moment) * x
+            out[k] = tuple(map(operator.add, out[k], (force, moment, abs(force), abs(moment))))
         return out
 
     def part(self, part):
@@ -247,7 +246,7 @@ class Judge:
         for p in self.told["push"]:
             b, begin, end = self.bodies[p.k], self.states[p.k], self.to[p.k]
             self.expect("comes to rest", 1e-3, abs(p.force) * b.light + abs(b.spin(end.q, p.moment, b.inverse)) * b.radius, 1, b.text)
-            power += p.force @ end.v + p.moment @ end.w
+            power += end.power(p)
             size += abs(p.force) * (abs(end.v) + abs(begin.v)) + abs(p.moment) * (abs(end.w) + abs(begin.w))
         belts = any(any(b.surface + b.surface_spin) for b in self.bodies.values())
         self.expect("work of what comes to rest", 1e-6, 0 if belts else abs(power), size, "impact")
@@ -293,11 +292,10 @@ class Judge:
 
     def joint_law(self, law, mid, dt):
         """The impulse of a limit (low 0), motor, friction or spring is within its bounds, and at one where the speed is not as wanted."""
-        before, speed, gives, opens = 0.0, 0.0, law.compliance, law.gap / dt if dt > 0 else 0.0
-        for on in self.told["on", law.k]:
-            b, was, now = self.bodies[on.k], self.states[on.k], mid[on.k]
-            before, speed = before + on.force @ was.v + on.moment @ was.w, speed + on.force @ now.v + on.moment @ now.w
-            gives += on.force @ on.force * b.light + on.moment @ b.spin(was.q, on.moment, b.inverse)
+        acts, opens = self.told["on", law.k], law.gap / dt if dt > 0 else 0.0
+        before, speed = (sum(states[on.k].power(on) for on in acts) for states in (self.states, mid))
+        gives = law.compliance + sum(self.bodies[on.k].struck(self.states[on.k]._replace(v=NONE, w=NONE), (on.force, on.moment)).power(on)
+                                     for on in acts)
         wanted = [law.wanted] if law.low < 0 else [min(-opens, 0.0), 0.0, -law.restitution * before]
         there = [law.x - (speed + law.compliance * law.x - each) / (gives or 1) for each in wanted]
         off = min(abs(law.x - max(law.low, min(law.high, each))) for each in there) * gives
@@ -373,16 +371,16 @@ class Judge:
 def main(files):
     worst = 0
     for file in files:
-        judge, why = Judge(), None
+        judge = Judge()
         try:
             judge.run(file)
+            broken = len(judge.faults)
+            code, verdict = min(broken, 1), f"{broken} laws broken" if broken else "holds"
+            said = [*judge.faults[:10], f"{verdict}, {judge.judged} judgements"]
         except (OSError, ArithmeticError, LookupError, ValueError, AttributeError, TypeError) as error:
-            why = f"cannot be judged, from t = {judge.when:g} s: {type(error).__name__}: {error}"
-        broken = len(judge.faults)
-        verdict = f"{broken} laws broken" if broken else "holds"
-        for said in [why] if why else [*judge.faults[:10], f"{verdict}, {judge.judged} judgements"]:
-            print(f"{file}: {said}")
-        worst = max(worst, 2 if why else min(broken, 1))
+            code, said = 2, [f"cannot be judged, from t = {judge.when:g} s: {type(error).__name__}: {error}"]
+        print("".join(f"{file}: {each}\n" for each in said), end="")
+        worst = max(worst, code)
     return worst
 
 
