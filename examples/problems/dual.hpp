@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <problems/rows.hpp>
 #include <random>
-#include <set>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -68,7 +69,8 @@ struct Dual {
 /// The unknowns on which a value may depend. Comparisons are decided at random: every branch
 /// counts.
 struct Depends {
-  std::set<int> on;
+  static constexpr std::size_t kUnknowns = 512;
+  std::bitset<kUnknowns> on;
   Depends() = default;
   Depends(double) {}
 
@@ -78,7 +80,7 @@ struct Depends {
   friend Depends operator*(Depends a, const Depends& b) { return a += b; }
   friend Depends operator/(Depends a, const Depends& b) { return a += b; }
   Depends& operator+=(const Depends& b) {
-    on.insert(b.on.begin(), b.on.end());
+    on |= b.on;
     return *this;
   }
   Depends& operator-=(const Depends& b) { return *this += b; }
@@ -108,19 +110,20 @@ class Dependence {
   /// value(y, g) takes Depends entries.
   template <class Value>
   Dependence(std::size_t n, std::size_t m, Value value) : starts{0}, direction_(n, 0) {
-    constexpr int kTrials = 64;
-    std::vector<Depends> at(n), g(m);
-    for (std::size_t j = 0; j < n; ++j) at[j].on = {static_cast<int>(j)};
-    std::vector<std::set<int>> rows(m);
+    constexpr int kTrials = 512;  // three comparisons lead to a branch in one of eight
+    if (n > Depends::kUnknowns) throw std::invalid_argument("Dependence: too many unknowns");
+    std::vector<Depends> at(n), g(m), rows(m);
+    for (std::size_t j = 0; j < n; ++j) at[j].on.set(j);
     for (int trial = 0; trial < kTrials; ++trial) {
       value(at.data(), g.data());
-      for (std::size_t i = 0; i < m; ++i) rows[i].insert(g[i].on.begin(), g[i].on.end());
+      for (std::size_t i = 0; i < m; ++i) rows[i] += g[i];
     }
-    for (const std::set<int>& row : rows) {
-      columns.insert(columns.end(), row.begin(), row.end());
+    for (const Depends& row : rows) {
+      for (std::size_t j = 0; j < n; ++j)
+        if (row.on[j]) columns.push_back(static_cast<int>(j));
       starts.push_back(static_cast<int>(columns.size()));
     }
-    for (std::size_t j = 0; j < n; ++j) choose_direction(static_cast<int>(j), rows);
+    for (std::size_t j = 0; j < n; ++j) choose_direction(j, rows);
   }
 
   /// found(i, e, slope) for every entry e of row i at y; value(y, g) takes Dual entries. Returns g.
@@ -145,15 +148,15 @@ class Dependence {
 
  private:
   // The first direction that no unknown before j has in the rows that contain it.
-  void choose_direction(int j, const std::vector<std::set<int>>& rows) {
-    std::set<int> taken;
-    for (const std::set<int>& row : rows)
-      if (row.count(j) > 0)
-        for (auto other = row.begin(); *other < j; ++other)
-          taken.insert(direction_[static_cast<std::size_t>(*other)]);
-    int& direction = direction_[static_cast<std::size_t>(j)];
-    while (taken.count(direction) > 0) ++direction;
-    directions_ = std::max(directions_, direction + 1);
+  void choose_direction(std::size_t j, const std::vector<Depends>& rows) {
+    Depends beside;
+    for (const Depends& row : rows)
+      if (row.on[j]) beside += row;
+    std::vector<char> taken(j + 1, 0);
+    for (std::size_t other = 0; other < j; ++other)
+      if (beside.on[other]) taken[static_cast<std::size_t>(direction_[other])] = 1;
+    direction_[j] = static_cast<int>(std::find(taken.begin(), taken.end(), 0) - taken.begin());
+    directions_ = std::max(directions_, direction_[j] + 1);
   }
 
   std::vector<int> direction_;  // of each unknown: those of one direction share no row
