@@ -110,7 +110,7 @@ double slide(int points, double h, bool with_sum = false) {
   Statistics statistics;
   const auto mover = make_contiguous_rows(rows, options, statistics, at.n, false);
   const Candidate candidate = at.candidate(h);
-  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->set_algebraic(candidate, nullptr, {}) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::success);
   CHECK(mover->remaining_drift(candidate) <= 1e-12);
   double largest = 0.0;
@@ -131,7 +131,7 @@ long solutions_of_failure(int points, bool sparse) {
   Statistics statistics;
   const auto mover = make_contiguous_rows(rows, options, statistics, at.n, sparse);
   const Candidate candidate = at.candidate(1e-4);
-  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->set_algebraic(candidate, nullptr, {}) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::not_converged);
   return statistics.iterations;
 }
@@ -162,7 +162,7 @@ double rate_by_nearly_dependent_rows(int points) {
   Statistics statistics;
   const auto mover = make_contiguous_rows(sparse, options, statistics, at.n, true);
   const Candidate candidate = at.candidate(1e-12);
-  REQUIRE(mover->set_algebraic(candidate, nullptr) == Status::success);
+  REQUIRE(mover->set_algebraic(candidate, nullptr, {}) == Status::success);
   REQUIRE(mover->move(candidate).status == Status::success);
   const auto y = [&](int i) { return candidate.base_entries[i] + candidate.correction_entries[i]; };
   return std::abs(y(0) * y(2 * points) + y(1) * y(2 * points + 1));

@@ -149,13 +149,51 @@ TEST_CASE("loose weight on a multiplier: nothing is dumped there") {
 TEST_CASE("charges that F keeps: voltages follow them, whatever their tolerances") {
   Problem gate = tether::problems::nand_gate("index 1");
   const auto nodes = static_cast<std::ptrdiff_t>(gate.atol_scale.size()) / 2;
-  for (const double unit : {1.0, 1e-3, 6e-5}) {
-    std::fill(gate.atol_scale.begin() + nodes, gate.atol_scale.end(), unit);
-    const Run run = integrate(gate, 1e-6, gate.recommended_constraints(), {}, false);
-    INFO("charges in units of " << unit << ": error " << run.error);
-    REQUIRE(run.flag >= 0);
-    CHECK(run.error < 5e-6);  // plain IDA: at most 1.6e-6 in 3300 to 3700 steps
-    CHECK(run.steps < 5000);
+  for (const double unit : {1.0, 1e-3, 6e-5})
+    for (const double tolerance : {1e-4, 1e-6}) {
+      std::fill(gate.atol_scale.begin() + nodes, gate.atol_scale.end(), unit);
+      const Run run = integrate(gate, tolerance, gate.recommended_constraints(), {}, false);
+      INFO("charges in units of " << unit << ", tolerance " << tolerance << ": " << run.error);
+      REQUIRE(run.flag >= 0);
+      CHECK(run.error < 5.0 * tolerance);
+      CHECK(run.steps < 5000);  // plain IDA: 1400 and 3300 to 3700
+    }
+}
+
+TEST_CASE("charges of capacitors that are not linear: what moves leave is no response of F") {
+  // q_i' = 2 C_i sin 3 t - C_i v_i - current to the other, q_i = c_i (v_i + 0.3 v_i^3).
+  for (const double C : {1e-2, 1e-3, 1e-4}) {
+    const auto charge = [C](int i, const double* y) {
+      return (i == 0 ? C : 0.1 * C) * (y[i] + 0.3 * y[i] * y[i] * y[i]) - y[2 + i];
+    };
+    Problem p = tether::problems::start_problem("two capacitors", "index 1", 2, 10.0,
+                                                std::vector<double>(4, 0.0),
+                                                std::vector<double>(4, 0.0), {0.0, 0.0, 1.0, 1.0});
+    p.residual = [=](double t, const double* y, const double* yp, double* r) {
+      const double between = C * (y[0] - y[1]);
+      r[0] = yp[2] - C * (2.0 * std::sin(3.0 * t) - y[0]) + between;
+      r[1] = yp[3] - C * (2.0 * std::sin(3.0 * t) - y[1]) - between;
+      for (int i = 0; i < 2; ++i) r[2 + i] = charge(i, y);
+    };
+    Problem fine = p;
+    fine.atol_scale = {1.0, 1.0, 0.1 * C, 0.1 * C};
+    const std::vector<double> exact = integrate_plain(fine, 1e-11).y;
+    const auto of = [=](int i) {
+      return row(
+          i == 0 ? "first charge" : "second charge",
+          [=](double, const double* y) { return charge(i, y); },
+          [=](double, const double* y, double* slope) {
+            slope[i] = (i == 0 ? C : 0.1 * C) * (1.0 + 0.9 * y[i] * y[i]);
+            slope[2 + i] = -1.0;
+          });
+    };
+    const tp::Constraints charges = of(0) + of(1);
+    for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+      const Run run = integrate(p, tolerance, charges);
+      INFO("c = " << C << ", tolerance " << tolerance << ": " << run.y[0] << ", " << exact[0]);
+      REQUIRE(run.flag >= 0);
+      for (int i = 0; i < 2; ++i) CHECK(std::abs(run.y[i] - exact[i]) <= 10.0 * tolerance);
+    }
   }
 }
 

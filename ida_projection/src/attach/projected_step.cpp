@@ -179,11 +179,10 @@ int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candida
                       moved > options_.advanced.largest_move &&
                       moved > kSudden * run_.accepted_move &&
                       rows_.used->factors == RowsAt::Factors::of_all_rows;
-  const double whole =
-      rows_.used != nullptr ? std::hypot(moved, rows_.used->solved_length()) : moved;
-  control_.choose_step(
-      attempt, candidate, whole, response, run_.suppressed ? variables_.tested() : nullptr,
-      run_.suppressed ? variables_.id() : nullptr, sudden ? polish_.corrected() : nullptr);
+  control_.choose_step(attempt, candidate, moved, response, rows_.used,
+                       run_.suppressed ? variables_.tested() : nullptr,
+                       run_.suppressed ? variables_.id() : nullptr,
+                       sudden ? polish_.corrected() : nullptr);
   history_.hand_over(attempt);
   return report_.succeed();
 }
@@ -271,7 +270,8 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (in_use(Mechanism::joined_equations)) rows_.joined.join(candidate);
   rows_.used = rows_.joined.rows() != nullptr ? rows_.joined.rows() : rows_.own.get();
   if (corrector_.stopped()) return Status::callback_fatal;
-  const Status structured = rows_.used->set_algebraic(candidate, rows_.joined.moved_id());
+  const Status structured =
+      rows_.used->set_algebraic(candidate, rows_.joined.moved_id(), rows_.joined.repeats());
   if (structured != Status::success) return structured;  // the next attempt tries again
   run_.phase = Phase::engaged;
   if (!options_.suppress_algebraic) return structured;

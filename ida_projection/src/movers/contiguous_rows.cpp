@@ -157,10 +157,15 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   bool contradicts() override { return drops_rows() && rows_.contradict(WT()); }
   void refresh_pattern_soon() override { rows_.refresh_pattern_soon(); }
 
-  Status set_algebraic(const Candidate& candidate, N_Vector id) override {
+  Status set_algebraic(const Candidate& candidate, N_Vector id,
+                       const std::vector<char>& repeats) override {
     place(candidate);
+    rows_.set_equations(repeats);
     id_ = id;
     return structure(candidate.t, id);
+  }
+  const std::vector<int>& solved_for() const override {
+    return rows_.d.rows.empty() ? rows_.a.columns : RowsAt::solved_for();
   }
   bool keeps_blocks() const override { return rows_.keeps_blocks(); }
   void accept() override { metric_.accept(); }

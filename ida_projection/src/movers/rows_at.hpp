@@ -110,8 +110,16 @@ class RowsAt {
   virtual void refresh_pattern_soon() {}
 
   /// Which components are algebraic (1 differential, 0 algebraic; null: none), at a candidate.
-  virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/) {
+  /// `repeats`: of each row, it is an equation of F; empty: none is.
+  virtual Status set_algebraic(const Candidate& /*candidate*/, N_Vector /*id*/,
+                               const std::vector<char>& /*repeats*/) {
     return Status::success;
+  }
+  /// Algebraic variables that rows are solved for, ascending; none where other rows move others, to
+  /// which they respond.
+  virtual const std::vector<int>& solved_for() const {
+    static const std::vector<int> none;
+    return none;
   }
   /// Length of the moves so far over algebraic variables that `Solution::length` leaves out.
   virtual double solved_length() const { return 0.0; }

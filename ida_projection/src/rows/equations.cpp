@@ -146,14 +146,16 @@ class Span {
 struct Point {
   std::vector<double> y;
   Dense C, h;
+  bool hangs = false;  // some row contains an algebraic variable, however weakly
   linalg::LeastSquares factors{kQuotientRounding};  // of h_a^T
 
   bool evaluate_rows(Evaluator& rows, double t, const std::vector<double>& WT,
-                     const std::vector<int>& free) {
+                     const std::vector<int>& free, const std::vector<int>& algebraic) {
     C = Dense::Zero(rows.rows(), static_cast<Eigen::Index>(y.size()));
     const auto n = static_cast<int>(y.size());
-    return rows.jacobian(t, y.data(), n, WT.data(), free, C.data()) == Status::success &&
-           finish(&C, WT, free);
+    if (rows.jacobian(t, y.data(), n, WT.data(), free, C.data()) != Status::success) return false;
+    for (const int j : algebraic) hangs = hangs || (C.col(j).array() != 0.0).any();
+    return finish(&C, WT, free);
   }
   bool evaluate_equations(const Residual& residual, const std::vector<int>& equations,
                           const std::vector<double>& WT, const std::vector<int>& free,
@@ -164,7 +166,7 @@ struct Point {
     std::vector<double> weights(WT);
     for (double& w : weights) w = w > 0.0 ? 1.0 / w : 0.0;
     Differences of_F(
-        {equations, {equations.size(), all}, {}}, residual, [&] { return weights.data(); },
+        {equations, {equations.size(), all}, {}, {}}, residual, [&] { return weights.data(); },
         static_cast<int>(y.size()));
     if (of_F.entries(y.data(), h.data()) != 0 || !finish(&h, WT, free)) return false;
     Dense part(h.rows(), static_cast<Eigen::Index>(algebraic.size()));
@@ -205,42 +207,51 @@ struct Point {
 
 }  // namespace
 
-// Whether these rows are, up to factors, all equations of F without y': compares values at points
-// in three directions, far enough away that rounding stays below the tenth digit. Rows that only
-// touch an equation differ in the fifth. Costs three evaluations of F.
-static bool are_the_equations(Evaluator& rows, const Residual& residual,
-                              const std::vector<int>& which,
-                              const std::vector<char>& derivative_free, double t,
-                              const std::vector<double>& y, const std::vector<double>& WT) {
-  const auto equations = std::count(derivative_free.begin(), derivative_free.end(), 1);
-  if (equations != static_cast<std::ptrdiff_t>(which.size())) return false;
+// For each row whether it is, up to a factor, an equation of F without y': compares values at
+// points in three directions, far enough away that rounding stays below the tenth digit. Rows that
+// only touch an equation differ in the fifth. The last point is the first one with algebraic
+// variables on the other side of y: the row contains them as the equation does, however weakly.
+// Costs four evaluations of F.
+static std::vector<char> repeat_equations(Evaluator& rows, const Residual& residual,
+                                          const std::vector<char>& derivative_free, double t,
+                                          const std::vector<double>& y,
+                                          const std::vector<double>& WT, const double* id) {
   constexpr std::array<double, 3> directions = {2.9, 5.3, 8.1};
-  constexpr double kSame = 1e-8;
+  constexpr std::size_t kLast = directions.size();
+  constexpr double kSame = 1e-8, kSameChange = 1e-3, kRoundingOfChange = 1e-12;
   const std::vector<double> far = further_away(y, WT);
-  std::vector<double> point(y.size()), g[directions.size()], f[directions.size()];
-  for (std::size_t k = 0; k < directions.size(); ++k) {
-    for (std::size_t j = 0; j < y.size(); ++j)
-      point[j] = y[j] + std::sin(1.0 + directions[k] * static_cast<double>(j)) * (far[j] - y[j]);
+  std::vector<double> points[kLast + 1], g[kLast + 1], f[kLast + 1];
+  for (std::size_t k = 0; k <= kLast; ++k) {
+    points[k] = k < kLast ? y : points[0];
+    for (std::size_t j = 0; j < y.size(); ++j) {
+      if (k < kLast)
+        points[k][j] += std::sin(1.0 + directions[k] * static_cast<double>(j)) * (far[j] - y[j]);
+      else if (id[j] == 0.0)
+        points[k][j] = 2.0 * y[j] - points[0][j];
+    }
     g[k].resize(at(rows.rows()));
     f[k].resize(y.size());
-    if (rows.value(t, point.data(), static_cast<int>(y.size()), g[k].data()) != Status::success ||
-        !residual(point.data(), f[k].data()))
-      return false;
+    const auto n = static_cast<int>(y.size());
+    if (rows.value(t, points[k].data(), n, g[k].data()) != Status::success ||
+        !residual(points[k].data(), f[k].data()))
+      return {};
   }
-  const auto proportional = [&](std::size_t i, std::size_t e) {
+  const auto repeats_equation = [&](std::size_t i, std::size_t e) {
     bool same = g[0][i] != 0.0 && f[0][e] != 0.0;
-    for (std::size_t k = 1; k < directions.size(); ++k) {
+    for (std::size_t k = 1; k < kLast; ++k) {
       const double a = g[k][i] * f[0][e], b = g[0][i] * f[k][e];
       same = same && std::abs(a - b) <= kSame * std::abs(a);
     }
-    return same;
+    const double change = g[kLast][i] - g[0][i];
+    const double a = change * f[0][e], b = g[0][i] * (f[kLast][e] - f[0][e]);
+    return same && std::abs(change) > kRoundingOfChange * std::abs(g[0][i]) &&
+           std::abs(a - b) <= kSameChange * std::abs(a);
   };
-  std::vector<char> taken(y.size(), 0);
-  return std::all_of(which.begin(), which.end(), [&](int i) {
-    for (std::size_t e = 0; e < y.size(); ++e)
-      if (derivative_free[e] && !taken[e] && proportional(at(i), e)) return taken[e] = 1;
-    return char{0};
-  });
+  std::vector<char> taken(y.size(), 0), repeats(g[0].size(), 0);
+  for (std::size_t i = 0; i < repeats.size(); ++i)
+    for (std::size_t e = 0; repeats[i] == 0 && e < y.size(); ++e)
+      if (derivative_free[e] && !taken[e] && repeats_equation(i, e)) repeats[i] = taken[e] = 1;
+  return repeats;
 }
 
 // Those of the rows `which` that constrain the differential variables in a direction that is not in
@@ -312,11 +323,14 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
   }
   // Away from the candidate structural entries are not zero; at the candidate they have their size.
   Point away{further_away(y, WT), {}, {}}, here{y, {}, {}};
-  if (algebraic.empty() || !here.evaluate_rows(rows, t, WT, free)) return found;
-  if (!away.evaluate_rows(rows, t, WT, free)) {
+  if (algebraic.empty() || !here.evaluate_rows(rows, t, WT, free, algebraic)) return found;
+  if (!away.evaluate_rows(rows, t, WT, free, algebraic)) {
     away.y = some_tolerances_away(y, WT);
-    if (!away.evaluate_rows(rows, t, WT, free)) return found;
+    if (!away.evaluate_rows(rows, t, WT, free, algebraic)) return found;
   }
+  if (!here.hangs && !away.hangs) return found;
+  const std::vector<char> is_equation = derivative_free();
+  found.repeats = repeat_equations(rows, residual, is_equation, t, y, WT, id);
 
   const int m = rows.rows();
   const auto contains = [&](int i, int j) { return away.C(i, j) != 0.0 || here.C(i, j) != 0.0; };
@@ -327,11 +341,12 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
     (hangs ? hanging : of_differential).push_back(i);
   }
   if (hanging.empty()) return found;
-  const std::vector<char> is_equation = derivative_free();
   for (int i = 0; i < n; ++i)
     if (is_equation[at(i)]) equations.push_back(i);
-  if (index_is_low && are_the_equations(rows, residual, hanging, is_equation, t, y, WT))
-    return found;
+  const bool all_repeat =
+      !found.repeats.empty() && hanging.size() == equations.size() &&
+      std::all_of(hanging.begin(), hanging.end(), [&](int i) { return found.repeats[at(i)]; });
+  if (index_is_low && all_repeat) return found;
   if (equations.empty() || !away.evaluate_equations(residual, equations, WT, free, algebraic) ||
       !here.evaluate_equations(residual, equations, WT, free, algebraic))
     return found;

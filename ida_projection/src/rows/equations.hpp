@@ -25,14 +25,15 @@ struct JoinedEquations {
   std::vector<int> equations;             ///< indices into F; empty: nothing has to be joined
   std::vector<std::vector<int>> columns;  ///< the unknowns in each, ascending
   std::vector<char> moves;                ///< N: algebraic variables that move with the rest
+  std::vector<char> repeats;  ///< of each row: it is an equation of F, up to a factor; empty: none
 };
 
 /// Finds the equations to join at the point y. `derivative_free()`: the equations of F without y'.
 /// id: 1 differential, 0 algebraic. WT: error weights. Nothing is joined for rows that repeat
 /// equations of F (a tension row), nor for rows whose algebraic variables F does not determine in
 /// this way (multipliers of velocity rows): these are solved for their algebraic variables.
-/// Without rows that contain free algebraic variables F is not evaluated; if F is of index 1 and
-/// the rows are its equations, it is hardly.
+/// Without rows that contain free algebraic variables, however weakly, F is not evaluated; if F is
+/// of index 1 and the rows are its equations, it is hardly.
 JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
                                       const std::function<std::vector<char>()>& derivative_free,
                                       double t, const std::vector<double>& y,

@@ -352,7 +352,8 @@ void SplitRows::inspect(double t, const double* y, const double* WT) {
       squares[algebraic(j) ? 1 : 0] += entry * entry;
     });
     char& without = without_[at(i)];
-    const bool lost = loses_algebraic_part(squares[1], squares[0], without != 0);
+    const bool lost = (of_F_.empty() || of_F_[at(i)] == 0) &&
+                      loses_algebraic_part(squares[1], squares[0], without != 0);
     outgrown_ |= lost != (without != 0);
     without = lost ? 1 : 0;
   }

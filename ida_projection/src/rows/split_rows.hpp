@@ -152,6 +152,9 @@ class SplitRows {
   Status structure(double t, const std::vector<double>& y, const std::vector<double>& WT,
                    const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
+  /// Of each row: it is an equation of F, which determines its algebraic variables. It is solved
+  /// for these however small their part in it is. Empty: none is.
+  void set_equations(const std::vector<char>& of_F) { of_F_ = of_F; }
   /// Whether evaluate() needs WT.
   bool needs_WT() const { return evaluator_.uses_differences() || !mixed_.empty(); }
 
@@ -234,6 +237,7 @@ class SplitRows {
   std::vector<bool> hold_;
   std::vector<double> id_;            // empty: none algebraic
   std::vector<int> mixed_;            // rows that contain unknowns of both kinds
+  std::vector<char> of_F_;            // of each row: it is an equation of F; empty: none
   std::vector<char> without_;         // of each row: its algebraic part is next to nothing
   std::vector<std::size_t> watched_;  // entries that would change the blocks, zero so far
   long evaluations_ = 0, next_refresh_ = 0;

@@ -27,6 +27,7 @@ bool JoinedRows::residual_at(const double* y, double* f) {
 void JoinedRows::forget() {
   rows_.reset();
   moved_id_ = OwnedVector();
+  repeats_.clear();
 }
 
 void JoinedRows::join(const Candidate& candidate) {
@@ -48,6 +49,7 @@ void JoinedRows::join(const Candidate& candidate) {
       rows, residual, [&] { return variables_.derivative_free_equations(candidate, corrector_); },
       candidate.t, y, WT, options_.hold, id, variables_.index_known() && !variables_.high_index());
   if (rows.report.fatal) corrector_.stop(-1, rows.report.text);
+  repeats_ = found.repeats;
   if (found.moves.empty()) return;
   moved_id_ = OwnedVector(candidate.base);
   for (std::size_t j = 0; j < n; ++j)
@@ -55,6 +57,8 @@ void JoinedRows::join(const Candidate& candidate) {
   if (found.equations.empty()) return;
   joined_ = constraints_ + as_constraints(
                                found, residual, [this] { return present_.weight_entries; }, size);
+  repeats_.resize(static_cast<std::size_t>(rows.rows()), 0);
+  repeats_.resize(static_cast<std::size_t>(joined_.total_count()), 1);
   rows_ = make_rows(joined_, options_, statistics_, candidate.base, rows.rows());
   rows_->reset();
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
@@ -36,6 +37,8 @@ class JoinedRows {
   const Constraints& constraints() const { return joined_; }
   /// 1 where a variable moves with the rest, 0 where it follows; null: all move.
   N_Vector moved_id() const { return moved_id_ ? moved_id_ : variables_.id(); }
+  /// Of each row that is moved: it is an equation of F; empty: none is.
+  const std::vector<char>& repeats() const { return repeats_; }
 
  private:
   bool residual_at(const double* y, double* f);
@@ -46,8 +49,9 @@ class JoinedRows {
   Corrector& corrector_;
   const AlgebraicVariables& variables_;
   Candidate present_{};
-  Constraints joined_;           // the caller's rows and equations of F
-  OwnedVector moved_id_;         // id, with 1 where an algebraic variable moves with the rest
+  Constraints joined_;    // the caller's rows and equations of F
+  OwnedVector moved_id_;  // id, with 1 where an algebraic variable moves with the rest
+  std::vector<char> repeats_;
   OwnedVector none_, f_, kept_;  // of residual_at(): ycor = 0, F, the prediction
   std::unique_ptr<RowsAt> rows_;
 };

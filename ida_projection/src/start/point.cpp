@@ -48,7 +48,7 @@ Status PointProjection::arrange(const Candidate& point, const std::vector<bool>&
     }
   if (mask == id_ && held == options_.hold && rows_->keeps_blocks()) return Status::success;
   options_.hold = held;
-  const Status status = rows_->set_algebraic(point, id);
+  const Status status = rows_->set_algebraic(point, id, {});
   if (status == Status::success)
     id_ = mask;
   else

@@ -9,6 +9,9 @@
 // r sqrt(C(2k+2, k+1)) to it, and the test multiplies it by about 1/(k+1). The tolerance grows by a
 // multiple of that contribution, and stays as it is where y_a does not respond.
 //
+// Variables that rows are solved for follow these, and leave nothing of that where nothing else
+// moves.
+//
 // S dy is measured by a polish after the move. A polish before it has removed the noise of the
 // corrector, which is no response. S depends on the direction of dy and is measured again and
 // again.
@@ -95,7 +98,7 @@ bool AlgebraicTest::stay() const {
 }
 
 void AlgebraicTest::widen(const Attempt& attempt, const Candidate& candidate, double move,
-                          const double* response) {
+                          const double* response, const std::vector<int>& solved) {
   detect_jump(attempt);
   if (attempt.accepted) {
     ++measured_;
@@ -106,6 +109,8 @@ void AlgebraicTest::widen(const Attempt& attempt, const Candidate& candidate, do
   }
   move_ = move;
   if (response != nullptr) note_response(candidate, move, response);
+  for (Variable& v : variables_)
+    if (std::binary_search(solved.begin(), solved.end(), v.index)) v.response = v.moved = 0.0;
   if (order_ != attempt.order) {
     order_ = attempt.order;
     noise_ = kOfNoise * noise_in_test(order_);

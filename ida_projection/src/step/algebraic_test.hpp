@@ -18,9 +18,10 @@ class AlgebraicTest {
   /// In the first step: whether their error has stayed although IDA has shortened the step.
   bool stay() const;
   /// Lowers the weights of an attempt that will be handed over, after a move of this length.
-  /// `response`: change of y by which F has responded to the move; null: not measured.
+  /// `response`: change of y by which F has responded to the move; null: not measured. `solved`:
+  /// variables that rows are solved for, ascending: they do not respond.
   void widen(const Attempt& attempt, const Candidate& candidate, double move,
-             const double* response);
+             const double* response, const std::vector<int>& solved);
   /// Length of the response to a move by one tolerance, in tolerances; infinity: it was not
   /// measured in the latest steps; 0: no variable is tested.
   double response_length(const Candidate& candidate) const;

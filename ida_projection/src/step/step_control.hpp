@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "host/candidate.hpp"
 #include "host/mechanisms.hpp"
+#include "movers/rows_at.hpp"
 #include "step/algebraic_test.hpp"
 #include "step/ida_settings.hpp"
 #include "step/order_limit.hpp"
@@ -35,17 +35,18 @@ class StepControl {
     if (same_step) restore(weights, factor);
   }
   /// For an attempt that will be handed over, after a move of this length (infinity: it was not
-  /// moved). `response`: see AlgebraicTest. `tested`: the variables of IDA's error test,
-  /// `differential`: those whose oscillations count (null: all); `unmoved`: the correction before a
-  /// sudden move (null: an ordinary one).
+  /// moved). `response`: see AlgebraicTest; `rows`: those moved, null: there are none. `tested`:
+  /// the variables of IDA's error test, `differential`: those whose oscillations count (null: all);
+  /// `unmoved`: the correction before a sudden move (null: an ordinary one).
   void choose_step(const Attempt& attempt, const Candidate& candidate, double move,
-                   const double* response, N_Vector tested, N_Vector differential,
-                   N_Vector unmoved) {
+                   const double* response, const RowsAt* rows, N_Vector tested,
+                   N_Vector differential, N_Vector unmoved) {
     // |ycor| decides the next step size, its ratio to the second difference the order.
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
     if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance))
-      algebraic_test_.widen(attempt, candidate, move, response);
+      algebraic_test_.widen(attempt, candidate, std::hypot(move, rows->solved_length()), response,
+                            rows->solved_for());
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {

@@ -96,7 +96,8 @@ class VectorRows : public Newton<VectorRows<Store>> {
   bool contradicts() override { return rows_.contradict(dy_); }
 
   // Algebraic components are held as long as no row contains them.
-  Status set_algebraic(const Candidate& candidate, N_Vector id) override {
+  Status set_algebraic(const Candidate& candidate, N_Vector id,
+                       const std::vector<char>& /*repeats*/) override {
     id_ = id;
     moves_ = true;
     free_all();
