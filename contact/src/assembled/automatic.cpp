@@ -58,7 +58,6 @@ Status Automatic::rotate(Search& search, int most_idle) {
   for (int idle = 0; !search.confirmed() && !search.exhausted(); first = false) {
     const bool expensive = sweep(search, first, by_bodies);
     if (search.confirmed() || search.exhausted()) break;
-    const double swept = search.best_error;
     if (regular && expensive) proximal_path(search);
     if (regular && !expensive && first) interior_points(search, by_bodies);
     const bool rounding = !search.confirmed() && at_round_off(search);
@@ -68,8 +67,6 @@ Status Automatic::rotate(Search& search, int most_idle) {
     if (rounding) return Status::round_off;
     newton_.run(search, search.best.data(), kProblems);
     if (search.confirmed() || search.exhausted()) break;
-    // Sweeps start anew where the others have gained.
-    if (search.best_error < 0.9 * swept) sweeps_.start(search.best.data());
     const bool gains = !(search.best_error > 0.5 * halved);
     if (gains) halved = search.best_error;
     idle = gains ? 0 : idle + 1;
@@ -148,7 +145,7 @@ bool Automatic::order_after_sweeps(Search& search) {
 // Sweeps take turns with solves of the parts in which they do not settle, until the work `until` is
 // done. Solves that do not reduce the error become rarer.
 void Automatic::sweep_and_solve_parts(Search& search, double until) {
-  constexpr double kShare = 0.5, kCheap = 0.1, kPartShare = 0.1;      // of the work before
+  constexpr double kCheap = 0.1, kPartShare = 0.1;                    // of the work before
   constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
   const double begin = search.counts.work;
   double in_parts = 0, halved = search.best_error, between = kBetween;
@@ -166,7 +163,6 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
       continue;
     }
     const double before = search.counts.work;
-    if (in_parts > kShare * (before - begin)) continue;
     x_.assign(sweeps_.point(), sweeps_.point() + contacts_);
     const bool changed = parts_.run(search, x_, kPartShare * before);
     in_parts += search.counts.work - before;

@@ -26,17 +26,17 @@ class LocalSolves {
 
  private:
   struct Part;  // a Search and its stages
-  bool find_errors(Search& search, const Packed& x);
   bool find_parts(Search& search, const Packed& x);
-  void add_part(const Problem& p, int seed, int largest);
-  bool solve_part(Search& search, int part, double budget, Packed& x);
+  void add_part(const Problem& p, int seed);
+  bool solve_part(Search& search, const std::vector<int>& contacts, double budget, Packed& x);
 
   int n_ = 0, layers_ = 1;
   int refused_ = 0;      // rounds that found too many contacts with errors of one size
   bool solved_ = false;  // a part, in the last round
   double most_ = 0;      // the largest error, as a velocity relative to its island's scale
   std::vector<double> error_;
-  std::vector<int> list_, start_, place_;  // contacts part by part; place of a contact in its part
+  std::vector<int> place_;               // of each contact in its part
+  std::vector<std::vector<int>> parts_;  // contacts, ascending
   std::unique_ptr<Part> part_;
 };
 

@@ -74,7 +74,7 @@ bool rule_out_proofs(const System& system, double tolerance, const Packed& w) {
 // Proximal point iteration for the frictionless problem: where that has no solution its steps
 // converge to such a d, the faster the smaller tau; where it has one, soon no w_n is below zero.
 bool proves_infeasible(Search& search, Packed& d) {
-  constexpr int kSteps = 40, kSweeps = 20, kCorrections = 12;
+  constexpr int kSteps = 40, kCorrections = 12;
   constexpr double kBeyond = 0.1;  // of max_work
   const Problem& problem = search.system.problem();
   const std::size_t n = at(problem.contacts());
@@ -93,21 +93,14 @@ bool proves_infeasible(Search& search, Packed& d) {
   newton.reset(problem.contacts());
   Packed anchor(n), point(n), w(n);
   double tau = 1e-2;
-  int sweeps = kSweeps;
   bool found = false;
   for (int step = 0; step < kSteps && !found && newton.affordable(smooth); ++step) {
-    for (int sweep = 0; sweep < sweeps; ++sweep) {
-      smooth.system.sweep(point.data(), {tau, anchor.data()});
-      smooth.count_sweep();
-    }
-    // A second call for one more Newton step: with the contacts that close known it is exact.
+    smooth.system.sweep(point.data(), {tau, anchor.data()});
+    smooth.count_sweep();
     if (newton.correct(smooth, tau, anchor.data(), point, kCorrections) == 0) {
       tau = std::min(1.0, 3 * tau);
-      sweeps = 10 * kSweeps;
       continue;
     }
-    sweeps = kSweeps;
-    newton.correct(smooth, tau, anchor.data(), point, 1);
     d.resize(n);
     for (std::size_t i = 0; i < n; ++i)
       for (int c = 0; c < 4; ++c) d[i].v[c] = point[i].v[c] - anchor[i].v[c];
@@ -115,13 +108,7 @@ bool proves_infeasible(Search& search, Packed& d) {
     velocities(problem, false, point.data(), w.data());
     smooth.counts.work += smooth.test_cost;
     if (rule_out_proofs(search.system, search.options.tolerance, w)) break;
-    // The next step from where this one leads.
-    for (std::size_t i = 0; i < n; ++i)
-      for (int c = 0; c < 4; ++c) {
-        const double last = point[i].v[c] - anchor[i].v[c];
-        anchor[i].v[c] = point[i].v[c];
-        point[i].v[c] += last;
-      }
+    anchor = point;
     if (step > 0) tau = std::max(1e-7, 0.1 * tau);
   }
   search.counts.sweeps += smooth.counts.sweeps;

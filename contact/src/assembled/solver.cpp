@@ -40,12 +40,6 @@ class IslandSolves {
   Automatic automatic_;
 };
 
-namespace {
-
-constexpr double kBlock = 20;  // ns that it takes to take a block out of the problem
-
-}  // namespace
-
 bool IslandSolves::serve(const Search& search) {
   constexpr double kNearlyAll = 0.9;
   if (search.options.measure != Measure::fixed_point || search.system.islands() < 2) return false;
@@ -55,14 +49,14 @@ bool IslandSolves::serve(const Search& search) {
 }
 
 void IslandSolves::solve(Search& search, Island& island, double budget) {
+  constexpr double kBlock = 20;  // ns that it takes to take a block out of the problem
   const std::vector<int>& contacts = island.contacts;
   const Problem problem = search.system.problem().part(contacts);
   search.counts.work += kBlock * static_cast<double>(problem.blocks().size());
   Options options = search.options;
   options.max_work = budget;
   search_.reset(problem, options);
-  search_.system.belong_to(search.system, contacts.data());
-  search_.system.share_as(search.system, contacts.data());
+  search_.system.belong_to(search.system, contacts);
   Packed start;
   for (int i : contacts) start.push_back(x_[at(i)]);
   search_.system.to_own_units(start.data());

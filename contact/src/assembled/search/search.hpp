@@ -36,10 +36,9 @@ class System {
  public:
   void reset(const Problem& problem, Law law);
 
-  // After reset() with some contacts of `whole`: takes over its laws and velocity scales.
-  void belong_to(const System& whole, const int* contacts);
-  // And its shares of bodies (method, section 3.1), which blocks of zeros in `whole` change.
-  void share_as(const System& whole, const int* contacts);
+  // After reset() with some contacts of `whole`: takes over its laws, velocity scales and shares of
+  // bodies (method, section 3.1), which blocks of zeros in `whole` change.
+  void belong_to(const System& whole, const std::vector<int>& contacts);
 
   // The problem that stages solve: the given one, or the same in units without overflow.
   const Problem& problem() const { return *problem_; }

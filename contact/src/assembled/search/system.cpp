@@ -135,16 +135,13 @@ void System::reset(const Problem& given, Law law) {
   norm_b_ = std::sqrt(sum);
 }
 
-void System::belong_to(const System& whole, const int* contacts) {
+void System::belong_to(const System& whole, const std::vector<int>& contacts) {
   for (int i = 0; i < n_; ++i) {
-    if (whole.replaced(contacts[i])) replace(i);
-    const int unit = mass_.empty() ? 0 : speed_[at(problem_->islands()[at(i)])];
-    inverse_scale_[at(i)] = std::ldexp(whole.inverse_scale(contacts[i]), -unit);
+    const int in_whole = contacts[at(i)];
+    if (whole.replaced(in_whole)) replace(i);
+    inverse_scale_[at(i)] = std::ldexp(whole.inverse_scale(in_whole), velocity_unit(i));
+    share_[at(i)] = whole.share_[at(in_whole)];
   }
-}
-
-void System::share_as(const System& whole, const int* contacts) {
-  for (int i = 0; i < n_; ++i) share_[at(i)] = whole.share_[at(contacts[i])];
 }
 
 void System::replace(int i) {
