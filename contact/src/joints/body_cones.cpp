@@ -279,6 +279,7 @@ void BodyCones::solve_island(const std::vector<BodyCone>& cones, const std::vect
     kept.push_back(c.cone);
     b.segment(n, rows) = approach(static_cast<int>(l), c, v);
     start.segment(n, rows) = x.segment(row_[at(cone)], rows);
+    // Far above the rounding of A, and too stiff to be felt: a part of what the bodies alone yield.
     soft.segment(n, rows) = 1e-5 * alone_[l];
     each_part(c.cone.kind, [&](int from, int count) {
       soft.segment(n + from, count).setConstant(soft.segment(n + from, count).mean());
@@ -300,7 +301,7 @@ void BodyCones::solve_island(const std::vector<BodyCone>& cones, const std::vect
       }
   }
   const ConeProblem problem = ConeProblem::sparse(A, b, kept);
-  // Dense factors of few cones cost little beside their solve.
+  // Dense factors of up to 20 cones cost little beside their solve.
   if (jointed && kept.size() <= 20 &&
       !(evaluate(problem, options_.law, start).error <= options_.tolerance) &&
       share_loads(problem) && !hold_all(problem, options_.tolerance, start)) {
