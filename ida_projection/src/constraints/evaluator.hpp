@@ -219,7 +219,8 @@ class Evaluator {
   int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
     if (C != nullptr && !part.C_checked) return write_first_C(part, n, g, C, fill);
     if (g == nullptr) return fill(g, C);
-    if (g < roomy_ || g >= roomy_end_) return write_to_room(part, n, g, C, fill);
+    constexpr std::less<const double*> before;  // orders pointers that are unrelated, too
+    if (before(g, roomy_) || !before(g, roomy_end_)) return write_to_room(part, n, g, C, fill);
     const Marks marks(g + part.set->count);
     const int flag = fill(g, C);
     return marks.untouched() ? flag : kOverran;

@@ -111,12 +111,14 @@ class Differences {
   std::vector<double> size_;  // largest |y_j| so far
 };
 
-// A point at which no unknown is zero by chance.
+// A point at which no unknown is zero by chance. The smallest relative tolerance tells how many
+// tolerances the size of an unknown is that happens to be zero.
 std::vector<double> further_away(const std::vector<double>& y, const std::vector<double>& WT) {
-  double largest = 0.0;
-  for (double value : y) largest = std::max(largest, std::abs(value));
+  double relative = kIncrement;
+  for (std::size_t j = 0; j < y.size(); ++j)
+    if (WT[j] > 0.0 && y[j] != 0.0) relative = std::min(relative, WT[j] / std::abs(y[j]));
   std::vector<double> reach = WT;
-  for (double& length : reach) length = std::max(length, kIncrement * largest);
+  for (double& length : reach) length *= kIncrement / relative;
   return some_tolerances_away(y, reach);
 }
 

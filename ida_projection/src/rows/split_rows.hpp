@@ -152,7 +152,7 @@ class SplitRows {
   Status structure(double t, const std::vector<double>& y, const std::vector<double>& WT,
                    const std::vector<bool>& hold, const double* id);
   bool structured() const { return structured_; }
-  /// Of each row: it is an equation of F, which determines its algebraic variables. It is solved
+  /// For each row: it is an equation of F, which determines its algebraic variables. It is solved
   /// for these however small their part in it is. Empty: none is.
   void set_equations(const std::vector<char>& of_F) { of_F_ = of_F; }
   /// Whether evaluate() needs WT.

@@ -37,7 +37,7 @@ class JoinedRows {
   const Constraints& constraints() const { return joined_; }
   /// 1 where a variable moves with the rest, 0 where it follows; null: all move.
   N_Vector moved_id() const { return moved_id_ ? moved_id_ : variables_.id(); }
-  /// Of each row that is moved: it is an equation of F; empty: none is.
+  /// For each row that is moved: it is an equation of F; empty: none is.
   const std::vector<char>& repeats() const { return repeats_; }
 
  private:
