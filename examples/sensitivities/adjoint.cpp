@@ -163,5 +163,5 @@ int main() {
   for (SUNMatrix m : {A, B}) SUNMatDestroy(m);
   for (N_Vector v : {y, yp, z, zp, point, q}) N_VDestroy(v);
   SUNContext_Free(&context);
-  return worst < 3e-6 ? 0 : 1;
+  return worst < 1e-6 ? 0 : 1;
 }

@@ -119,8 +119,7 @@ class Projection::Impl {
     Busy before_;
   };
   struct Moved : Move {
-    Fix fix = Fix::none;               ///< of the polish beside the move
-    const double* response = nullptr;  ///< of y, by a polish before and one after it
+    Fix fix = Fix::none;  ///< of the polish beside the move
   };
 
   void attach();
@@ -143,8 +142,7 @@ class Projection::Impl {
   bool polishes_first() const;
   bool may_change_metric() const;
   void judge_capped(Move& move);
-  int hand_over(const Attempt& attempt, const Candidate& candidate, double moved,
-                const double* response = nullptr);
+  int hand_over(const Attempt& attempt, const Candidate& candidate, double moved);
   int finish(Status outcome, const std::string& text);
 
   // The caller's rows alone (null: there are none), and joined with equations of F.

@@ -147,7 +147,7 @@ int Projection::Impl::step(const Attempt& attempt, double tolerance, bool call_s
                   rows_.used->report.text + observer_.suspicion(attempt, candidate, move.status));
   run_.last_move = move.length;
   run_.left = move.left;
-  return hand_over(attempt, candidate, move.length, move.response);
+  return hand_over(attempt, candidate, move.length);
 }
 
 // Before the first move: whether this attempt needs one. Returns the code for IDA.
@@ -170,8 +170,7 @@ int Projection::Impl::begin_moves(const Attempt& attempt, bool* needed) {
 }
 
 // IDA will judge this attempt. `moved`: the length of the move; infinity: none was made.
-int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candidate, double moved,
-                                const double* response) {
+int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candidate, double moved) {
   run_.handed_move = moved;
   // Nearly dependent rows cause long moves, and a row that F does not keep causes one in every
   // step. Neither is a jump of F.
@@ -179,10 +178,10 @@ int Projection::Impl::hand_over(const Attempt& attempt, const Candidate& candida
                       moved > options_.advanced.largest_move &&
                       moved > kSudden * run_.accepted_move &&
                       rows_.used->factors == RowsAt::Factors::of_all_rows;
-  control_.choose_step(attempt, candidate, moved, response, rows_.used,
+  control_.choose_step(attempt, candidate, polish_, moved,
                        run_.suppressed ? variables_.tested() : nullptr,
                        run_.suppressed ? variables_.id() : nullptr,
-                       sudden ? polish_.corrected() : nullptr);
+                       sudden ? polish_.corrected() : nullptr, rows_.used);
   history_.hand_over(attempt);
   return report_.succeed();
 }
@@ -319,29 +318,23 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
       control_.expect_oscillations();
   }
   if (move.status != Status::success) return moved;
-  const double needs_response = polish_.longest_without_response(control_.smoothing());
-  const double responds = std::max(1.0, control_.response_length(candidate));
-  const bool polishes =
-      before != Fix::none
-          ? responds * std::hypot(move.length, rows_.used->solved_length()) > needs_response
-          : polish_.wanted(move.length, control_.smoothing());
+  const bool polishes = before != Fix::none
+                            ? move.length > polish_.longest_without_response(control_.smoothing())
+                            : polish_.wanted(move.length, control_.smoothing());
   // The polish is a refinement: if F or the linear solver fails in it, the move stands. A fatal
   // flag is kept by the corrector and ends the run.
   if (polishes) moved.fix = polish(true);
-  if (moved.fix == Fix::none) return moved;
-  if (unknowns_.contiguous) moved.response = polish_.response(candidate.cj, before != Fix::none);
-  move.status = rows_.used->settle(candidate, polish_.delta());
+  if (moved.fix != Fix::none) move.status = rows_.used->settle(candidate, polish_.delta());
   return moved;
 }
 
-// Polishing before the move saves one linear solve: the move removes what the polish violates, and
-// a short move needs no response of F. Where IDA tests algebraic variables the noise of the
-// corrector must not be moved at all, since they respond to moves.
+// Polishing before the move saves one linear solve: the move removes what the polish violates. The
+// response of F to the move is then left out, so that this order is not taken where IDA's error
+// test of algebraic variables needs the response.
 bool Projection::Impl::polishes_first() const {
-  if (!in_use(Mechanism::polish_first) || (may_change_metric() && !metric_choice_.calm()))
-    return false;
-  if (control_.tests_algebraic()) return polish_.can_be_made();
-  return run_.last_move <= polish_.longest_without_response(control_.smoothing()) &&
+  return in_use(Mechanism::polish_first) &&
+         run_.last_move <= polish_.longest_without_response(control_.smoothing()) &&
+         !control_.tests_algebraic() && (metric_choice_.calm() || !may_change_metric()) &&
          polish_.wanted(0.0, control_.smoothing());
 }
 

@@ -214,7 +214,9 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   Status value_at(double t, N_Vector y, std::vector<double>& g) override {
     return evaluator_.value(t, N_VGetArrayPointer(y), unknowns(), g.data());
   }
-  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id) override {
+  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id,
+                   const std::vector<char>& repeats) override {
+    rows_.set_equations(repeats);
     t_ = t;
     at_.weight_entries = N_VGetArrayPointer(weights);
     std::copy_n(N_VGetArrayPointer(y), y_.size(), y_.begin());

@@ -137,9 +137,11 @@ class RowsAt {
   }
 
   /// For moves on the tangent of the constraints, which leave rounding only: C at y, with the
-  /// reciprocal tolerances of y. Rows that are dependent on the set have dependent derivatives
-  /// there, up to an error as large as the distance from the set: thin rows take no part.
-  virtual Status linearise(double /*t*/, N_Vector /*y*/, N_Vector /*weights*/, N_Vector /*id*/) {
+  /// reciprocal tolerances of y; id and repeats as in set_algebraic(). Rows that are dependent on
+  /// the set have dependent derivatives there, up to an error as large as the distance from the
+  /// set: thin rows take no part.
+  virtual Status linearise(double /*t*/, N_Vector /*y*/, N_Vector /*weights*/, N_Vector /*id*/,
+                           const std::vector<char>& /*repeats*/) {
     return Status::misused;
   }
   /// Its factors in the metric D, one entry for each component.

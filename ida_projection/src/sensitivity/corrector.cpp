@@ -246,7 +246,7 @@ Status SensitivityCorrector::evaluate(const StepData& step) {
   y_ = step.y;
   IDAGetErrWeights(state_.ida_.mem(), weights_);
   N_Vector id = state_.engaged() ? state_.rows_.joined.moved_id() : nullptr;
-  return rows_->linearise(step.t, y_, weights_, id);
+  return rows_->linearise(step.t, y_, weights_, id, state_.rows_.joined.repeats());
 }
 
 // In the metric of sensitivity k; `first`: its correction is that of IDAS.

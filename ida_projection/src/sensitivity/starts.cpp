@@ -86,7 +86,7 @@ ConsistencyReport Projection::Impl::project_gradient(double t, N_Vector yy, N_Ve
   N_VConst(1.0, unit);
   std::vector<double> r(static_cast<std::size_t>(rows.count()), 0.0);
   rows.report.fatal = false;
-  report.status = rows.linearise(t, yy, unknowns_.weights, nullptr);
+  report.status = rows.linearise(t, yy, unknowns_.weights, nullptr, {});
   if (report.status == Status::success) report.status = rows.factor_in(unit);
   if (report.status == Status::success) report.status = rows.product(v, r);
   if (report.status == Status::success) {
@@ -115,7 +115,7 @@ void SensitivityCorrector::make_consistent(double t, N_Vector y, N_Vector yp, N_
   // r_ and the factors of C at (t + e, y + e y').
   const auto residual = [&](int k, double e, N_Vector of) {
     N_VLinearSum(1.0, y, e, yp, at);
-    Status status = rows_->linearise(t + e, at, weights, state_.variables_.id());
+    Status status = rows_->linearise(t + e, at, weights, state_.variables_.id(), {});
     if (status == Status::success) status = rows_->factor_in(D);
     if (status == Status::success) status = derivative(k, t + e, at);
     if (status == Status::success) status = rows_->product(of, r_);

@@ -169,7 +169,7 @@ bool PointProjection::tangent(double t, N_Vector y, N_Vector yp, N_Vector id,
   N_VInv(weights_, dy_);
   const bool known = rows_->value_at(t + h, y, ahead) == Status::success &&
                      rows_->value_at(t - h, y, behind) == Status::success &&
-                     rows_->linearise(t, y, weights_, id) == Status::success &&
+                     rows_->linearise(t, y, weights_, id, {}) == Status::success &&
                      rows_->factor_in(dy_) == Status::success &&
                      rows_->product(yp, defect) == Status::success;
   for (std::size_t i = 0; i < m; ++i) defect[i] += (ahead[i] - behind[i]) / (2.0 * h);

@@ -31,7 +31,8 @@ constexpr double kMisledFactor = 2.0;
 }  // namespace
 
 void Polish::allocate(N_Vector like) {
-  for (OwnedVector* each : {&delta_, &corrected_, &work_, &noise_}) *each = OwnedVector(like);
+  for (OwnedVector* each : {&delta_, &corrected_, &work_, &noise_, &residual_})
+    *each = OwnedVector(like);
 }
 
 void Polish::keep(const Candidate& candidate) {
@@ -79,10 +80,12 @@ double Polish::response_length(const Candidate& candidate) {
   return std::isfinite(length) ? length : -1.0;
 }
 
-const double* Polish::response(double cj, bool after_polish) {
-  if (after_polish) return N_VGetArrayPointer(delta_);
-  if (known_ == Known::nothing) return nullptr;
-  N_VLinearSum(1.0, delta_, -algebraic_factor(cj), noise_, work_);
+const double* Polish::response(const Candidate& candidate, N_Vector residual) {
+  N_VScale(1.0, residual, residual_);
+  const bool known = know_noise();
+  N_VScale(1.0, residual_, residual);
+  if (!known) return nullptr;
+  N_VLinearSum(1.0, delta_, -algebraic_factor(candidate.cj), noise_, work_);
   return N_VGetArrayPointer(work_);
 }
 

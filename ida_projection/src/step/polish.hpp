@@ -91,7 +91,7 @@ class Polish {
   void allocate(N_Vector like);
   /// Gives its vectors the fast kernels where they are serial.
   void quicken() const {
-    fast::quicken({delta_, corrected_, work_, noise_}, false);
+    fast::quicken({delta_, corrected_, work_, noise_, residual_}, false);
     if (forecast_) forecast_->quicken();
   }
   /// A new attempt begins.
@@ -115,7 +115,8 @@ class Polish {
   /// Whether a polish is worth its price after a move of this length. `smoothing`: step sizes are
   /// smoothed.
   bool wanted(double length, bool smoothing) const {
-    if (!can_be_made()) return false;
+    if (!corrector_.solves() || iterative_) return false;
+    if (options_.advanced.polish == Polished::none) return false;
     // After two iterations the corrector needs no third one, unless the algebraic variables must
     // respond to the move. With smoothed step sizes the polish is always made, because the number
     // of iterations scatters from step to step. Multipliers of index 2 are an exception: they need
@@ -124,15 +125,12 @@ class Polish {
     const bool high_index = variables_.any() && variables_.high_index();
     return (smoothing && !high_index) || length > longest_without_response(smoothing);
   }
-  bool can_be_made() const {
-    return is_response_available() && options_.advanced.polish != Polished::none;
-  }
   /// Longer moves need a response of the algebraic variables; infinity if there are none.
   double longest_without_response(bool smoothing) const {
     if (!variables_.any()) return std::numeric_limits<double>::infinity();
     return smoothing ? kNeedsResponseOfMultipliers : kNeedsResponse;
   }
-  /// Whether response_length() can be computed.
+  /// Whether response(), of contiguous vectors, can be computed.
   bool is_response_available() const { return corrector_.solves() && !iterative_; }
   /// After a move: length of the response -J^-1 F_y dy over the differential variables, in
   /// tolerances; -1: F or the linear solver fails.
@@ -154,8 +152,9 @@ class Polish {
   }
 
   /// After add_newton_step(): the part of delta() that is the response of algebraic variables to
-  /// the move, N entries. Null: not known. `after_polish`: there was no noise before the move.
-  const double* response(double cj, bool after_polish);
+  /// the move, N entries. Null: F or the linear solver fails. Costs one evaluation of F.
+  /// `residual`: IDA's own, from which IDAS takes differences for sensitivities; it is restored.
+  const double* response(const Candidate& candidate, N_Vector residual);
   N_Vector delta() const { return delta_; }          ///< of add_newton_step()
   N_Vector corrected() const { return corrected_; }  ///< the corrector's ycor
   long iterations() const { return iterations_; }    ///< in this solve()
@@ -185,7 +184,7 @@ class Polish {
   Statistics& statistics_;
   Corrector& corrector_;
   const AlgebraicVariables& variables_;
-  OwnedVector delta_, corrected_, work_, noise_;
+  OwnedVector delta_, corrected_, work_, noise_, residual_;
   // noise_ is -J^-1 F at corrected_, delta_ the Newton step of the present moved point.
   Known known_ = Known::nothing;
   bool iterative_ = false;  // IDA's linear solver is a Krylov method

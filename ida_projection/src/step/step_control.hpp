@@ -14,6 +14,8 @@
 
 namespace tether::ida_projection {
 
+class Polish;
+
 /// Smooth step sizes, the order limit and the test of algebraic variables, and the rejected steps
 /// that decide whether they begin.
 class StepControl {
@@ -35,18 +37,17 @@ class StepControl {
     if (same_step) restore(weights, factor);
   }
   /// For an attempt that will be handed over, after a move of this length (infinity: it was not
-  /// moved). `response`: see AlgebraicTest; `rows`: those moved, null: there are none. `tested`:
-  /// the variables of IDA's error test, `differential`: those whose oscillations count (null: all);
-  /// `unmoved`: the correction before a sudden move (null: an ordinary one).
-  void choose_step(const Attempt& attempt, const Candidate& candidate, double move,
-                   const double* response, const RowsAt* rows, N_Vector tested,
-                   N_Vector differential, N_Vector unmoved) {
+  /// moved). The last polish followed the move. `tested`: the variables of IDA's error test,
+  /// `differential`: those whose oscillations count (null: all); `unmoved`: the correction before a
+  /// sudden move (null: an ordinary one); `rows`: those that were moved; null: there are none.
+  void choose_step(const Attempt& attempt, const Candidate& candidate, Polish& polish, double move,
+                   N_Vector tested, N_Vector differential, N_Vector unmoved, const RowsAt* rows) {
     // |ycor| decides the next step size, its ratio to the second difference the order.
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
     if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance))
-      algebraic_test_.widen(attempt, candidate, std::hypot(move, rows->solved_length()), response,
-                            rows->solved_for());
+      test_algebraic(attempt, candidate, polish, std::hypot(move, rows->solved_length()),
+                     rows->solved_for());
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {
@@ -76,10 +77,6 @@ class StepControl {
   /// Stiff components have responded to moves; see OrderLimit.
   void expect_oscillations() { order_limit_.expect_oscillations(); }
   bool tests_algebraic() const { return algebraic_test_.acts(); }
-  /// See AlgebraicTest.
-  double response_length(const Candidate& candidate) const {
-    return algebraic_test_.response_length(candidate);
-  }
   double weights_factor() const { return weights_factor_; }
   bool smoothing() const { return smoother_.on(); }
   /// Begins smoothing, unless Advanced::smooth_where_needed is off.
@@ -99,6 +96,8 @@ class StepControl {
   static constexpr int kTrapped = 10 * (kOftenRefused - 1);
 
   void restore(N_Vector weights, double factor) const;
+  void test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
+                      double move, const std::vector<int>& solved);
   void apply(const Control& control);
   void test_unmoved(const Attempt& attempt, double before, double after);
 

@@ -132,7 +132,8 @@ class Gradient final : public VectorRows<GradientStore> {
     return status;
   }
   // Algebraic components do not move where no row contains them.
-  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id) override {
+  Status linearise(double t, N_Vector y, N_Vector weights, N_Vector id,
+                   const std::vector<char>& /*repeats*/) override {
     const Status status = rows_.fill(t, y);
     if (status != Status::success) return status;
     for (std::size_t i = 0; i < C_.size(); ++i) N_VScale(1.0, rows_.rows.gradients()[i], C_[i]);
