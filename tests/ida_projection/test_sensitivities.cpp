@@ -698,6 +698,53 @@ TEST_CASE("projected sensitivities: rows on algebraic variables that F determine
   }
 }
 
+TEST_CASE("projected sensitivities: charges of small capacitors, by capacitance and conductance") {
+  // cos 3 t and -sin 3 t drive two capacitors that are not linear: unknowns are these, the voltages
+  // and the charges. Charges have next to no part in the rows' error weights.
+  const auto charge = [](int i, const Complex* y, const Complex* p) {
+    const Complex v = y[2 + i];
+    return (i == 0 ? p[0] : 0.1 * p[0]) * (v + 0.3 * v * v * v) - y[4 + i];
+  };
+  for (const double c : {1e-2, 1e-4}) {
+    Parametric m;
+    m.size = 6;
+    m.rows = 2;
+    m.p = {c, c};
+    m.y0 = {0.0, 1.0, 0.0, 0.0, 0.0, 0.0};
+    m.yp0 = {3.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    m.id = {1.0, 1.0, 0.0, 0.0, 1.0, 1.0};
+    m.s0.assign(2, std::vector<double>(6, 0.0));
+    m.sp0 = m.s0;
+    m.F = [=](const Complex* y, const Complex* yp, const Complex* p, Complex* r) {
+      const Complex between = p[1] * (y[2] - y[3]);
+      r[0] = yp[0] - 3.0 * y[1];
+      r[1] = yp[1] + 3.0 * y[0];
+      r[2] = yp[4] - p[1] * (2.0 * y[0] - y[2]) + between;
+      r[3] = yp[5] - p[1] * (2.0 * y[0] - y[3]) - between;
+      for (int i = 0; i < 2; ++i) r[4 + i] = charge(i, y, p);
+    };
+    m.g = [=](const Complex* y, const Complex* p, Complex* g) {
+      for (int i = 0; i < 2; ++i) g[i] = charge(i, y, p);
+    };
+    Sensitive tight(m, 1e-10, 10.0);
+    tight.begin(true);
+    REQUIRE(tight.run() >= 0);
+    std::vector<std::vector<double>> exact;
+    for (N_Vector s : tight.s)
+      exact.emplace_back(N_VGetArrayPointer(s), N_VGetArrayPointer(s) + m.size);
+    for (const bool error_control : {false, true})
+      for (const double tolerance : {1e-4, 1e-6}) {
+        INFO("c = " << c << ", tolerance " << tolerance << ", error control " << error_control);
+        Sensitive projected(m, tolerance, 10.0);
+        projected.begin(error_control);
+        projected.attach();
+        projected.project();
+        REQUIRE(projected.run() >= 0);
+        CHECK(projected.error(exact, 4) <= 20.0 * tolerance);
+      }
+  }
+}
+
 TEST_CASE("projected sensitivities: IDAS' own residuals by differences") {
   const auto exact = pendulum_derivatives(1.3, 9.8, 5.0);
   double errors[2], drifts[2];
