@@ -273,8 +273,7 @@ void Automatic::proximal_path_from_small(Search& search) {
   const double before = search.best_error;
   for (double small : {1e-3, 1e-6}) {
     x_ = search.best;
-    for (PackedVector& v : x_)
-      for (double& c : v.v) c *= small;
+    entries(x_) *= small;
     search.system.sweep(x_.data());
     search.count_sweep();
     interior_.run_proximal(search, x_.data(), kProblems, newton_, true);
@@ -314,18 +313,13 @@ Status Automatic::give_up(Search& search) {
   if (search.solved()) return Status::solved;
   if (search.exhausted()) return Status::work_limit;
   x_ = search.best;
-  double change = 0, size = 0;
   for (int k = 0; k < kSweeps; ++k) {
     z_ = x_;
     search.system.sweep(x_.data());
     search.count_sweep();
   }
-  for (std::size_t i = 0; i < x_.size(); ++i)
-    for (int c = 0; c < 3; ++c) {
-      change += (x_[i].v[c] - z_[i].v[c]) * (x_[i].v[c] - z_[i].v[c]);
-      size += x_[i].v[c] * x_[i].v[c];
-    }
-  return change > 1e-8 * size ? Status::cycling : Status::stalled;
+  const bool moves = (entries(x_) - entries(z_)).norm() > 1e-4 * entries(x_).norm();
+  return moves ? Status::cycling : Status::stalled;
 }
 
 }  // namespace tether::contact::detail

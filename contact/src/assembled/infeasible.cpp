@@ -102,8 +102,7 @@ bool proves_infeasible(Search& search, Packed& d) {
       continue;
     }
     d.resize(n);
-    for (std::size_t i = 0; i < n; ++i)
-      for (int c = 0; c < 4; ++c) d[i].v[c] = point[i].v[c] - anchor[i].v[c];
+    entries(d) = entries(point) - entries(anchor);
     found = keep_proof(search.system, search.options.tolerance, d);
     velocities(problem, false, point.data(), w.data());
     smooth.counts.work += smooth.test_cost;
@@ -111,9 +110,7 @@ bool proves_infeasible(Search& search, Packed& d) {
     anchor = point;
     if (step > 0) tau = std::max(1e-7, 0.1 * tau);
   }
-  search.counts.sweeps += smooth.counts.sweeps;
-  search.counts.factorisations += smooth.counts.factorisations;
-  search.counts.work += smooth.counts.work;
+  search.counts.add(smooth.counts);
   return found;
 }
 

@@ -76,8 +76,7 @@ class SparseFactors final : public EquationFactors {
     kTransposed ? lu_.solve_transposed(y) : lu_.solve(y);
     for (int k = 0; k < 2; ++k) {
       kTransposed ? e_.multiply_transposed(y, rest_.data()) : e_.multiply(y, rest_.data());
-      for (std::size_t i = 0; i < rest_.size(); ++i)
-        for (int c = 0; c < 3; ++c) rest_[i].v[c] = right_[i].v[c] - rest_[i].v[c];
+      entries(rest_) = entries(right_) - entries(rest_);
       kTransposed ? lu_.solve_transposed(rest_.data()) : lu_.solve(rest_.data());
       for (std::size_t i = 0; i < rest_.size(); ++i)
         for (int c = 0; c < 3; ++c) y[i].v[c] += rest_[i].v[c];
@@ -160,26 +159,6 @@ class DeficientFactors final : public EquationFactors {
 
 }  // namespace
 
-std::unique_ptr<EquationFactors> dense_factors(const IslandEquations& equations,
-                                               double rank_tolerance) {
-  return std::make_unique<DenseFactors>(equations, rank_tolerance);
-}
-
-std::unique_ptr<EquationFactors> sparse_factors(const IslandEquations& equations) {
-  auto factors = std::make_unique<SparseFactors>(equations);
-  if (!factors->regular()) return nullptr;
-  return factors;
-}
-
-std::unique_ptr<EquationFactors> deficient_factors(const IslandEquations& equations,
-                                                   double rank_tolerance) {
-  return std::make_unique<DeficientFactors>(equations, rank_tolerance);
-}
-
-using linalg::at;
-using linalg::PackedVector;
-using linalg::PackedVectors;
-
 void IslandEquations::multiply(const PackedVector* y, PackedVector* out) const {
   for (int i = 0; i < size(); ++i) {
     PackedVector sum;
@@ -210,22 +189,17 @@ namespace {
 double find_free_direction(IslandEquations& e) {
   PackedVectors z(e.contacts.size());
   e.free.resize(z.size());
-  double phase = 0, whole = 0, left = 0;
+  double phase = 0;
   for (PackedVector& v : z)
     for (int c = 0; c < 3; ++c) {
       phase += 0.6180339887498949;  // the golden ratio
       phase -= std::floor(phase);
       v.v[c] = phase - 0.5;
-      whole += v.v[c] * v.v[c];
     }
   e.multiply(z.data(), e.free.data());
   e.factors->solve(e.free.data());
-  for (std::size_t i = 0; i < z.size(); ++i)
-    for (int c = 0; c < 3; ++c) {
-      e.free[i].v[c] = z[i].v[c] - e.free[i].v[c];
-      left += e.free[i].v[c] * e.free[i].v[c];
-    }
-  return std::sqrt(left / whole);
+  entries(e.free) = entries(z) - entries(e.free);
+  return entries(e.free).norm() / entries(z).norm();
 }
 
 // The least singular value of M, by inverse iteration from the direction that M hardly sees.
@@ -233,12 +207,8 @@ double least_singular_value(IslandEquations& e) {
   PackedVectors y = e.free;
   double length = 0;
   const auto normalise = [&] {
-    length = 0;
-    for (const PackedVector& v : y)
-      for (double c : v.v) length += c * c;
-    length = std::sqrt(length);
-    for (PackedVector& v : y)
-      for (double& c : v.v) c /= length;
+    length = entries(y).norm();
+    entries(y) /= length;
   };
   normalise();
   for (int k = 0; k < 3 && length > 0; ++k) {
@@ -255,19 +225,21 @@ void IslandEquations::factor(double rank_tolerance) {
   constexpr double kLost = 1e-5;  // of a known solution: M is singular to working precision
   deficiency = 0;
   if (size() > 100) {
-    factors = sparse_factors(*this);
-    if (factors && find_free_direction(*this) <= kLost &&
+    auto sparse = std::make_unique<SparseFactors>(*this);
+    const bool regular = sparse->regular();
+    factors = std::move(sparse);
+    if (regular && find_free_direction(*this) <= kLost &&
         least_singular_value(*this) > rank_tolerance) {
       free.clear();
       return;
     }
   }
   if (size() <= 400) {
-    factors = dense_factors(*this, rank_tolerance);
+    factors = std::make_unique<DenseFactors>(*this, rank_tolerance);
     deficiency = factors->deficiency();
     if (deficiency > 0) find_free_direction(*this);
   } else {
-    factors = deficient_factors(*this, rank_tolerance);
+    factors = std::make_unique<DeficientFactors>(*this, rank_tolerance);
     deficiency = factors->deficiency();
     if (find_free_direction(*this) > kLost) deficiency = std::max(deficiency, 1);
   }

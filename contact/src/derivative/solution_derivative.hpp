@@ -36,15 +36,6 @@ struct IslandEquations {
   void factor(double rank_tolerance);
 };
 
-/// By complete orthogonal decomposition.
-std::unique_ptr<EquationFactors> dense_factors(const IslandEquations& equations,
-                                               double rank_tolerance);
-/// Sparse LU with refinement; null: a pivot vanishes.
-std::unique_ptr<EquationFactors> sparse_factors(const IslandEquations& equations);
-/// Minimum-norm factors of M, and of its transpose once these are asked for.
-std::unique_ptr<EquationFactors> deficient_factors(const IslandEquations& equations,
-                                                   double rank_tolerance);
-
 /// Change of the equations of each contact by a change of the data, or the gradient with respect to
 /// it.
 struct DataChange {

@@ -16,6 +16,8 @@ using linalg::at;
 // limits: call overhead below, first-level cache above.
 constexpr int kLeast = 64, kMost = 384;
 
+constexpr int kOneChunk = 256;  // up to this an island is one chunk
+
 // Number of colours in the bit masks of chunks; chunks beyond get a colour of their own.
 constexpr int kMasked = std::numeric_limits<std::int64_t>::digits;
 
@@ -236,14 +238,6 @@ void ContactsByKind::group(const int* begin, const int* end, const ContactPairs&
     }
   }
 }
-
-namespace {
-
-using linalg::at;
-
-constexpr int kOneChunk = 256;  // up to this an island is one chunk
-
-}  // namespace
 
 void ContactGraph::build(int bodies, const std::vector<int>& first, const std::vector<int>& second,
                          const std::vector<Kind>& kind, bool in_fours) {

@@ -8,11 +8,7 @@
 
 namespace tether::contact::detail {
 
-namespace {
-
 using linalg::at;
-
-}  // namespace
 
 double LawRows::speed(int law, const std::vector<Vector6d>& v) const {
   double s = 0;

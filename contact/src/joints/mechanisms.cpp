@@ -9,7 +9,6 @@
 #include <tether/linalg/index.hpp>
 #include <utility>
 
-#include "joints/mechanisms.hpp"
 #include "problem/body_form.hpp"
 #include "problem/criterion.hpp"
 

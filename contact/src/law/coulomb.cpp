@@ -150,59 +150,6 @@ struct Secular {
   }
 };
 
-}  // namespace
-
-bool Coulomb::only_two(const LocalBlock& L, const LocalRhs& r, double room, double l) {
-  const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1;
-  const double z0 = s0 + l * r.h0, z1 = s1 + l * r.h1, zz = z0 * z0 + z1 * z1, z = std::sqrt(zz);
-  const double w1 = r.k * (L.beta[0] + L.beta[1]) - L.g[0] * r.h0 - L.g[1] * r.h1;
-  const double straight = w1 + 2 * r.k * l;
-  const double d = r.h0 * r.h1 * (L.beta[0] - L.beta[1]), hh = r.h0 * r.h0 + r.h1 * r.h1;
-  if (!(straight * z > z0 * r.h0 + z1 * r.h1)) return false;
-  if (!(d * d <= 2 * r.k * zz * z || straight * straight >= hh)) return false;
-  // The other zero of the first quadratic, by the product of both.
-  const double m = (room - (z0 * s0 + z1 * s1) / z) / (r.k * l), s = std::sqrt(s0 * s0 + s1 * s1);
-  return m < 0 || (m < l && room - s + m * (w1 - (s0 * r.h0 + s1 * r.h1) / s + m * r.k) < 0);
-}
-
-bool Coulomb::safeguarded(const LocalBlock& L, const LocalRhs& r, double warm, double& l,
-                          int& evaluations) {
-  const double beta_min = std::min(L.beta[0], L.beta[1]), beta_max = std::max(L.beta[0], L.beta[1]);
-  const double h = std::sqrt(r.h0 * r.h0 + r.h1 * r.h1), ik = 1 / r.k;
-  const double gh = L.g[0] * r.h0 + L.g[1] * r.h1;
-  if (!(h * ik < 1e60 * beta_max)) return false;
-  auto [lo, hi] = scalar::slip_bracket(L.e, h, ik, beta_min, beta_max);
-  if (!(l > lo && l < hi)) l = warm > lo && warm < hi ? warm : lo;
-  // A Newton step of 3e-8 leaves round-off unless the two beta are far apart.
-  const double stop = beta_max < 1e3 * beta_min ? 3e-8 : 1e-12;
-  for (int n = 0; n < kMaxEvaluations; ++n) {
-    ++evaluations;
-    auto [excess, q, z, zh, slope] =
-        scalar::slip_equation(l, r.k, L.beta[0], L.beta[1], L.g[0], L.g[1], r.h0, r.h1, gh);
-    double step = excess * q * z / (r.k * slope);
-    if (!(slope > 0 && q > 0.1 * z) || n > 8) {  // near the pole of p / q, e > 1: Newton for f
-      slope = (r.k * (L.beta[0] + l + (L.beta[1] + l)) - gh) * z - zh;
-      step = excess * z / slope;
-    }
-    if (excess > 0) {
-      lo = l;
-    } else {
-      hi = l;
-    }
-    double next = l + step;
-    if (std::abs(step) <= stop * (l + beta_min) && slope > 0) {
-      l = next < lo ? lo : (next > hi ? hi : next);
-      return true;
-    }
-    if (!(next > lo && next < hi) || !(slope > 0)) next = 0.5 * (lo + hi);
-    if (next == l || hi - lo <= 1e-16 * (hi + beta_min)) break;
-    l = next;
-  }
-  return true;
-}
-
-namespace {
-
 // visit(lambda) for the zeros of f beyond 0, and maybe for points that are none; e: at 0.
 template <class Visit>
 void each_zero(Secular& e, const LocalBlock& L, const LocalRhs& r, double least, bool static_,
@@ -292,6 +239,55 @@ Regime nearest_ordinary(const LocalBlock& L, const LocalRhs& r, double bn, doubl
 }
 
 }  // namespace
+
+bool Coulomb::only_two(const LocalBlock& L, const LocalRhs& r, double room, double l) {
+  const double s0 = L.beta[1] * r.h0, s1 = L.beta[0] * r.h1;
+  const double z0 = s0 + l * r.h0, z1 = s1 + l * r.h1, zz = z0 * z0 + z1 * z1, z = std::sqrt(zz);
+  const double w1 = r.k * (L.beta[0] + L.beta[1]) - L.g[0] * r.h0 - L.g[1] * r.h1;
+  const double straight = w1 + 2 * r.k * l;
+  const double d = r.h0 * r.h1 * (L.beta[0] - L.beta[1]), hh = r.h0 * r.h0 + r.h1 * r.h1;
+  if (!(straight * z > z0 * r.h0 + z1 * r.h1)) return false;
+  if (!(d * d <= 2 * r.k * zz * z || straight * straight >= hh)) return false;
+  // The other zero of the first quadratic, by the product of both.
+  const double m = (room - (z0 * s0 + z1 * s1) / z) / (r.k * l), s = std::sqrt(s0 * s0 + s1 * s1);
+  return m < 0 || (m < l && room - s + m * (w1 - (s0 * r.h0 + s1 * r.h1) / s + m * r.k) < 0);
+}
+
+bool Coulomb::safeguarded(const LocalBlock& L, const LocalRhs& r, double warm, double& l,
+                          int& evaluations) {
+  const double beta_min = std::min(L.beta[0], L.beta[1]), beta_max = std::max(L.beta[0], L.beta[1]);
+  const double h = std::sqrt(r.h0 * r.h0 + r.h1 * r.h1), ik = 1 / r.k;
+  const double gh = L.g[0] * r.h0 + L.g[1] * r.h1;
+  if (!(h * ik < 1e60 * beta_max)) return false;
+  auto [lo, hi] = scalar::slip_bracket(L.e, h, ik, beta_min, beta_max);
+  if (!(l > lo && l < hi)) l = warm > lo && warm < hi ? warm : lo;
+  // A Newton step of 3e-8 leaves round-off unless the two beta are far apart.
+  const double stop = beta_max < 1e3 * beta_min ? 3e-8 : 1e-12;
+  for (int n = 0; n < kMaxEvaluations; ++n) {
+    ++evaluations;
+    auto [excess, q, z, zh, slope] =
+        scalar::slip_equation(l, r.k, L.beta[0], L.beta[1], L.g[0], L.g[1], r.h0, r.h1, gh);
+    double step = excess * q * z / (r.k * slope);
+    if (!(slope > 0 && q > 0.1 * z) || n > 8) {  // near the pole of p / q, e > 1: Newton for f
+      slope = (r.k * (L.beta[0] + l + (L.beta[1] + l)) - gh) * z - zh;
+      step = excess * z / slope;
+    }
+    if (excess > 0) {
+      lo = l;
+    } else {
+      hi = l;
+    }
+    double next = l + step;
+    if (std::abs(step) <= stop * (l + beta_min) && slope > 0) {
+      l = next < lo ? lo : (next > hi ? hi : next);
+      return true;
+    }
+    if (!(next > lo && next < hi) || !(slope > 0)) next = 0.5 * (lo + hi);
+    if (next == l || hi - lo <= 1e-16 * (hi + beta_min)) break;
+    l = next;
+  }
+  return true;
+}
 
 // In units in which beta and h are near 1. A grazing contact, k far below h / beta: its impulse is
 // k h / (|h| + g.h) to more than double precision, or on an asymptote and does not depend on k. It

@@ -3,7 +3,6 @@
 #include <tether/contact/bodies.hpp>
 
 #include <Eigen/Geometry>
-
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -13,9 +12,8 @@
 #include "problem/refuse.hpp"
 
 namespace tether::contact {
-namespace {
+
 using linalg::at;
-}  // namespace
 
 Matrix6d RigidBody::inverse_mass_matrix() const {
   Matrix6d out = Matrix6d::Zero();

@@ -3,12 +3,17 @@
 
 #include "proof/regime_equations.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "problem/refuse.hpp"
 
 namespace tether::contact::detail {
 namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
 
 [[noreturn]] void refuse_range(int contact, const char* what, double value) {
   throw OutOfRange(contact, std::string(what) + " = " + shown(value) +
@@ -24,6 +29,13 @@ double shifted(int contact, const char* what, double value, int exponent) {
 
 // k so that value 2^-k is near 1; 0 for 0.
 int exponent_of(double value) { return value > 0 ? std::ilogb(value) : 0; }
+
+VectorXd without_separating(VectorXd x, const std::vector<Regime>& regimes, int dimension) {
+  for (std::size_t i = 0; i < regimes.size(); ++i)
+    if (regimes[i] == Regime::separating)
+      x.segment(dimension * static_cast<Index>(i), dimension).setZero();
+  return x;
+}
 
 }  // namespace
 
@@ -83,20 +95,6 @@ Interval tangent_length(const Interval* x, int dimension) {
   return root(dimension == 2 ? square(x[1]) : square(x[1]) + square(x[2]));
 }
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
-namespace {
-
-VectorXd without_separating(VectorXd x, const std::vector<Regime>& regimes, int dimension) {
-  for (std::size_t i = 0; i < regimes.size(); ++i)
-    if (regimes[i] == Regime::separating)
-      x.segment(dimension * static_cast<Index>(i), dimension).setZero();
-  return x;
-}
-
-}  // namespace
-
 RegimeEquations::RegimeEquations(const ProofIsland& island, const std::vector<Regime>& regimes,
                                  const VectorXd& x)
     : island_(island),
@@ -143,15 +141,9 @@ void RegimeEquations::slide(int row, int contact) {
   F_[at(row + 2)] = Interval(c / 2) * (square(t[0]) + square(t[1]) - square(Interval(mu) * normal));
 }
 
-VectorXd RegimeEquations::middle() const {
+VectorXd RegimeEquations::values(double (Interval::*of)() const) const {
   VectorXd out(static_cast<Index>(F_.size()));
-  for (Index k = 0; k < out.size(); ++k) out[k] = F_[static_cast<std::size_t>(k)].middle();
-  return out;
-}
-
-VectorXd RegimeEquations::radius() const {
-  VectorXd out(static_cast<Index>(F_.size()));
-  for (Index k = 0; k < out.size(); ++k) out[k] = F_[static_cast<std::size_t>(k)].radius();
+  std::transform(F_.begin(), F_.end(), out.begin(), std::mem_fn(of));
   return out;
 }
 

@@ -65,9 +65,9 @@ class RegimeEquations {
                   const Eigen::VectorXd& x);
 
   const Eigen::VectorXd& x() const { return x_; }
-  Eigen::VectorXd middle() const;                  ///< of F
-  Eigen::VectorXd radius() const;                  ///< of F
-  const Eigen::MatrixXd& J() const { return J_; }  ///< rounded
+  Eigen::VectorXd middle() const { return values(&Interval::middle); }  ///< of F
+  Eigen::VectorXd radius() const { return values(&Interval::radius); }  ///< of F
+  const Eigen::MatrixXd& J() const { return J_; }                       ///< rounded
   /// At least |F(x + e) - F(x) - J e| for every |e| <= rho, with J as rounded; spread >= |A| rho.
   Eigen::VectorXd remainder(const Eigen::VectorXd& rho, const Eigen::VectorXd& spread) const;
   /// Unknowns as a vector of all contacts, with zeros.
@@ -75,6 +75,7 @@ class RegimeEquations {
 
  private:
   void slide(int row, int contact);
+  Eigen::VectorXd values(double (Interval::*of)() const) const;
 
   const ProofIsland& island_;
   const std::vector<Regime>& regimes_;

@@ -10,7 +10,15 @@
 namespace tether::contact::detail {
 namespace {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+// At least P v for P, v >= 0.
+VectorXd product_above(const MatrixXd& P, const VectorXd& v) {
+  VectorXd out = P * v;
+  for (double& sum : out) sum = above(sum, static_cast<double>(P.cols()));
+  return out;
+}
 
 // The regime of the projection of x - w on the cone (Alart and Curnier, CMAME 92 (1991) 353). A
 // contact whose regime changes moves to that projection.
@@ -67,20 +75,6 @@ Candidate polish(const ProofIsland& island) {
   }
   return best;
 }
-
-namespace {
-
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-// At least P v for P, v >= 0.
-VectorXd product_above(const MatrixXd& P, const VectorXd& v) {
-  VectorXd out = P * v;
-  for (double& sum : out) sum = above(sum, static_cast<double>(P.cols()));
-  return out;
-}
-
-}  // namespace
 
 // With R near J^-1 the map e -> e - R F(x + e) = -R F(x) + (I - R J) e - R remainder takes the box
 // |e| <= rho into the box of `image`. If that is smaller it has a fixed point (Brouwer), and R is

@@ -17,6 +17,14 @@ namespace tether::contact::detail {
 
 using Packed = linalg::PackedVectors;
 
+/// All components, with a zero behind each three.
+inline Eigen::Map<Eigen::VectorXd> entries(Packed& x) {
+  return {x.data()->v, 4 * static_cast<Eigen::Index>(x.size())};
+}
+inline Eigen::Map<const Eigen::VectorXd> entries(const Packed& x) {
+  return {x.data()->v, 4 * static_cast<Eigen::Index>(x.size())};
+}
+
 inline linalg::BlockPattern pattern(const Problem& p) {
   return {p.contacts(), p.row_start().data(), p.columns().data()};
 }
@@ -50,8 +58,8 @@ class System {
   double price_of_bodies() const;  ///< estimated ns of find_bodies()
   bool in_other_units() const { return !mass_.empty(); }
   // Impulses of the given problem in these units, and back. Exact within the range of doubles.
-  void to_own_units(PackedVector* x) const;
-  void to_given_units(PackedVector* x) const;
+  void to_own_units(PackedVector* x) const { change_units(x, -1); }
+  void to_given_units(PackedVector* x) const { change_units(x, 1); }
   // Exponents of units: impulses and velocities of contact i in these units, times these powers of
   // 2, are those of the given problem.
   int impulse_unit(int i) const {
@@ -111,6 +119,7 @@ class System {
 
  private:
   void choose_units(const Problem& problem);
+  void change_units(PackedVector* x, int sign) const;
   View error_view();
   double natural_map_given(const PackedVector* x, PackedVector* scratch) const;
   const LawKernels& law_of(int i) const { return replaced(i) ? *law_->replacement : *law_; }

@@ -77,19 +77,9 @@ void System::choose_units(const Problem& given) {
   problem_ = &rescaled_;
 }
 
-void System::to_own_units(PackedVector* x) const {
-  if (mass_.empty()) return;
-  for (int i = 0; i < n_; ++i) {
-    const std::size_t k = at(problem_->islands()[at(i)]);
-    for (double& v : x[i].v) v = std::ldexp(v, speed_[k] - mass_[k]);
-  }
-}
-void System::to_given_units(PackedVector* x) const {
-  if (mass_.empty()) return;
-  for (int i = 0; i < n_; ++i) {
-    const std::size_t k = at(problem_->islands()[at(i)]);
-    for (double& v : x[i].v) v = std::ldexp(v, mass_[k] - speed_[k]);
-  }
+void System::change_units(PackedVector* x, int sign) const {
+  for (int i = 0; in_other_units() && i < n_; ++i)
+    for (double& v : x[i].v) v = std::ldexp(v, sign * impulse_unit(i));
 }
 
 double System::price_of_bodies() const {

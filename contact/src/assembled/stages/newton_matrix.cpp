@@ -12,15 +12,11 @@ namespace {
 
 typedef double v4 __attribute__((vector_size(32)));
 
-// C = A B, and C += A B
-TETHER_INLINE void multiply(const PackedBlock& A, const PackedBlock& B, PackedBlock& C) {
-  const v4* a = reinterpret_cast<const v4*>(A.column);
-  v4* c = reinterpret_cast<v4*>(C.column);
-  for (int j = 0; j < 3; ++j) {
-    const double* b = B.column + 4 * j;
-    c[j] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  }
-}
+constexpr double kClearly = 0.5;  // of the price by contacts: the digits cost refinements
+constexpr double kOrderBodies = 500, kOrderContacts = 100;  // ns a contact, a block
+constexpr double kStepSweeps = 3;                           // of a step besides its factors
+
+// C += A B, and C = A B
 TETHER_INLINE void add_product(const PackedBlock& A, const PackedBlock& B, PackedBlock& C) {
   const v4* a = reinterpret_cast<const v4*>(A.column);
   v4* c = reinterpret_cast<v4*>(C.column);
@@ -28,6 +24,10 @@ TETHER_INLINE void add_product(const PackedBlock& A, const PackedBlock& B, Packe
     const double* b = B.column + 4 * j;
     c[j] += a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   }
+}
+TETHER_INLINE void multiply(const PackedBlock& A, const PackedBlock& B, PackedBlock& C) {
+  C = {};
+  add_product(A, B, C);
 }
 TETHER_INLINE void apply(const PackedBlock& A, const double* x, double* y, double sign) {
   const v4* a = reinterpret_cast<const v4*>(A.column);
@@ -143,14 +143,6 @@ void BodyNewton::solve(PackedVector* y) {
     for (int c = 0; c < 3; ++c) y[i].v[c] = out[c];
   }
 }
-
-namespace {
-
-constexpr double kClearly = 0.5;  // of the price by contacts: the digits cost refinements
-constexpr double kOrderBodies = 500, kOrderContacts = 100;  // ns a contact, a block
-constexpr double kStepSweeps = 3;                           // of a step besides its factors
-
-}  // namespace
 
 PackedBlock own_block(const LocalBlock& L, double factor) {
   PackedBlock out;

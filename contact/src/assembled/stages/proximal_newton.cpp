@@ -35,14 +35,11 @@ bool ProximalNewton::direction(Search& search, double tau) {
       blocks.R.column[5 * c] = 1;
     }
     blocks.a = own_block(search.system.problem().local(i), -1);
-    for (int c = 0; c < 4; ++c) dx_[at(i)].v[c] = z_[at(i)].v[c] - x_[at(i)].v[c];
   }
+  entries(dx_) = entries(z_) - entries(x_);
   if (!matrix_.factor(search)) return false;
   matrix_.solve(dx_.data());
-  double sum = 0;
-  for (int i = 0; i < n_; ++i)
-    for (int c = 0; c < 3; ++c) sum += dx_[at(i)].v[c] * dx_[at(i)].v[c];
-  return std::isfinite(sum);
+  return std::isfinite(entries(dx_).squaredNorm());
 }
 
 int ProximalNewton::inner(Search& search, double tau) {
@@ -54,9 +51,7 @@ int ProximalNewton::inner(Search& search, double tau) {
     if (!direction(search, tau)) return -1;
     bool accepted = false;
     for (double t : {1.0, 0.4, 0.16, 0.064}) {
-      for (int i = 0; i < n_; ++i) {
-        for (int c = 0; c < 3; ++c) trial_[at(i)].v[c] = x_[at(i)].v[c] + t * dx_[at(i)].v[c];
-      }
+      entries(trial_) = entries(x_) + t * entries(dx_);
       double found = residual(search, trial_, trial_z_, proximal, false);
       if (!(found <= target)) {
         std::copy(trial_.begin(), trial_.end(), swept_.begin());
@@ -96,8 +91,7 @@ int ProximalNewton::correct(Search& search, double tau, const PackedVector* anch
   for (int step = 1; step <= most; ++step) {
     if (!affordable(search) || !direction(search, tau)) return 0;
     double move = 0;
-    for (int i = 0; i < n_; ++i)
-      for (int c = 0; c < 3; ++c) x_[at(i)].v[c] += dx_[at(i)].v[c];
+    entries(x_) += entries(dx_);
     const double next = residual(search, x_, z_, proximal, true);
     for (int i = 0; i < n_; ++i)
       for (int c = 0; c < 3; ++c) {

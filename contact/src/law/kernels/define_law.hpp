@@ -150,6 +150,19 @@ TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
   out.least = numbers ? least : std::numeric_limits<double>::infinity();
   return out;
 }
+
+// The whole law for one contact: singular blocks included.
+template <class L>
+TETHER_INLINE Regime solve_block(const LocalBlock& block, const double* b, double* x,
+                                 double& lambda, int& evaluations) {
+  Regime regime;
+  if ((block.null[0] || block.null[1]) &&
+      L::solve_singular(block, b[0], b[1], b[2], x, regime, evaluations)) {
+    return regime;
+  }
+  return L::solve(block, b[0], b[1], b[2], x, lambda, evaluations);
+}
+
 }  // namespace
 }  // namespace tether::contact::detail
 
@@ -173,24 +186,6 @@ TETHER_INLINE Test worst_error(const View& s, const PackedVector* x) {
   }                                                                                             \
   constexpr AssembledKernels name = {name##_sweep, name##_blocks, name##_natural, name##_error, \
                                      name##_exact_error};
-
-namespace tether::contact::detail {
-namespace {
-
-// The whole law for one contact: singular blocks included.
-template <class L>
-TETHER_INLINE Regime solve_block(const LocalBlock& block, const double* b, double* x,
-                                 double& lambda, int& evaluations) {
-  Regime regime;
-  if ((block.null[0] || block.null[1]) &&
-      L::solve_singular(block, b[0], b[1], b[2], x, regime, evaluations)) {
-    return regime;
-  }
-  return L::solve(block, b[0], b[1], b[2], x, lambda, evaluations);
-}
-
-}  // namespace
-}  // namespace tether::contact::detail
 
 #if TETHER_GROUPS
 #define TETHER_GROUP_KERNELS(L, Lanes)                                                         \

@@ -48,16 +48,10 @@ TETHER_INLINE void block_rhs(const View& s, const PackedVector* x, int i, const 
   }
 }
 
-}  // namespace
-}  // namespace tether::contact::detail
-
 // With large mass ratios the terms of A x - b nearly cancel. A sum of doubles is off by up to one
 // unit u |A| |x| for each of its terms, and so are D x_i - w_i and the block solution; the rounding
 // of x itself causes one unit only. Sums here are long doubles, and x_i - z_i is computed as a
 // correction, not as a difference of rounded points.
-
-namespace tether::contact::detail {
-namespace {
 
 using Wide = long double;
 

@@ -30,16 +30,6 @@ struct Sliding {
   v4 x0, x1, x2, lambda, rare;
 };
 
-}  // namespace
-}  // namespace tether::contact::detail::avx2
-
-#endif
-
-#if TETHER_GROUPS
-
-namespace tether::contact::detail::avx2 {
-namespace {
-
 // The whole law for the lanes in `mask`.
 template <class Rule>
 __attribute__((noinline)) void one_by_one(int mask, const GeneralGroup& g, const double* bn,

@@ -120,8 +120,7 @@ void SmoothedPairs::set(ConePair& pair) const {
 }
 
 void SmoothedPairs::move(const Packed& change, double length, double log_nu) {
-  for (std::size_t i = 0; i < rho_.size(); ++i)
-    for (int c = 0; c < 3; ++c) at_.z[i].v[c] += length * change[i].v[c];
+  entries(at_.z) += length * entries(change);
   at_.log_nu += log_nu;
 }
 
@@ -160,16 +159,6 @@ double SmoothedPairs::largest(const Packed& change) const {
   }
   return most;
 }
-
-namespace {
-
-// to += factor other
-void add(Packed& to, double factor, const Packed& other) {
-  for (std::size_t i = 0; i < to.size(); ++i)
-    for (int c = 0; c < 3; ++c) to[i].v[c] += factor * other[i].v[c];
-}
-
-}  // namespace
 
 // The solutions of x o u = nu e, A x - b = w(u), nu > 0, are a smooth curve that comes from
 // nu = infinity. Where contacts that stick and slide admit no solution nearby it turns: nu grows
@@ -214,16 +203,16 @@ struct InteriorPoint::ArclengthPath {
     pairs.change_of(own.newton_.change(), newton);
     own.newton_.plain_direction(system, own.equations_, 2 * nu);
     pairs.change_of(own.newton_.change(), rate);
-    add(rate, -1, newton);
+    entries(rate) -= entries(newton);
     const double square = pairs.inner(rate, rate) + 1;
     // Along the curve det F_y d nu / ds keeps its sign, F(y, nu) = 0 being its equations.
     const double forward = own.newton_.matrix().determinant_sign() > 0 ? -1 : 1;
     tangent.log_nu = forward / std::sqrt(square);
     if (!std::isfinite(tangent.log_nu)) return false;
-    tangent.z.assign(rate.size(), PackedVector());
-    add(tangent.z, tangent.log_nu, rate);
+    tangent.z.resize(rate.size());
+    entries(tangent.z) = tangent.log_nu * entries(rate);
     newton_log_nu = across ? -pairs.inner(rate, newton) / square : 0;
-    add(newton, newton_log_nu, rate);
+    entries(newton) += newton_log_nu * entries(rate);
     return true;
   }
 

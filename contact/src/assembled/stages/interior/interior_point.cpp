@@ -201,8 +201,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
   for (int outer = 0; outer < most; ++outer) {
     int corrections = 0;
     if (drifting) {
-      for (int i = 0; i < n_; ++i)
-        for (int c = 0; c < 3; ++c) point[at(i)].v[c] = anchor[at(i)].v[c] + rate[at(i)].v[c] / tau;
+      entries(point) = entries(anchor) + entries(rate) / tau;
       corrections = newton.correct(search, tau, anchor.data(), point, kCorrections);
     }
     bool found = corrections > 0;
@@ -223,8 +222,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       tau = std::min(kMost, 3 * tau);
       continue;
     }
-    for (int i = 0; i < n_; ++i)
-      for (int c = 0; c < 3; ++c) rate[at(i)].v[c] = tau * (point[at(i)].v[c] - anchor[at(i)].v[c]);
+    entries(rate) = tau * (entries(point) - entries(anchor));
     drifting = true;
     equations_.set_anchor(point.data());
     search.test(anchor.data(), By::factors);

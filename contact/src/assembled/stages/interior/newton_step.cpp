@@ -184,8 +184,7 @@ void InteriorNewton::direction(const System& system, const InteriorEquations& eq
   double defect = expand(system, equations);
   for (int k = 0; k < kRefinements && defect > kRefine; ++k) {
     matrix_.solve(defect_.data());
-    for (int i = 0; i < n_; ++i)
-      for (int c = 0; c < 3; ++c) step_[at(i)].v[c] += defect_[at(i)].v[c];
+    entries(step_) += entries(defect_);
     const double before = defect;
     defect = expand(system, equations);
     if (!(defect < 0.5 * before)) break;

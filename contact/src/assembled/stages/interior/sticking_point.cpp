@@ -35,7 +35,7 @@ void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector
   const Problem& p = search.system.problem();
   const int n = p.contacts();
   if (!factor(search, matrix)) return;
-  for (int i = 0; i < n; ++i) z_[at(i)] = p.packed_b()[at(i)];
+  z_ = p.packed_b();
   matrix.solve(z_.data());
   size_ = outside_ = 0;
   for (int i = 0; i < n; ++i) {
@@ -74,8 +74,7 @@ void StickingPoint::refine(Search& search, NewtonMatrix& matrix, const std::vect
     velocities(p, exact, z_.data(), w_.data());
     matrix.solve(w_.data());
     search.count_sweep();
-    for (int i = 0; i < n; ++i)
-      for (int c = 0; c < 3; ++c) z_[at(i)].v[c] -= w_[at(i)].v[c];
+    entries(z_) -= entries(w_);
   }
 }
 
