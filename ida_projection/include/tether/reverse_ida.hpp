@@ -111,6 +111,7 @@ class ReverseIda {
  private:
   ReverseIda(Equations equations, const ida_projection::SundialsBuild& host);
   class TETHER_HIDDEN Implementation;
+  Implementation& its() const;
   std::unique_ptr<Implementation> implementation_;
 };
 

@@ -31,51 +31,29 @@ struct Content {
 Content& content(SUNLinearSolver solver) { return *static_cast<Content*>(solver->content); }
 
 #ifdef SUN_COMM_NULL  // SUNDIALS 7
-constexpr int kSuccess = SUN_SUCCESS, kWrongMatrix = SUN_ERR_ARG_OUTOFRANGE;
+constexpr int kWrongMatrix = SUN_ERR_ARG_OUTOFRANGE;
 #else
-constexpr int kSuccess = SUNLS_SUCCESS, kWrongMatrix = SUNLS_ILL_INPUT;
+constexpr int kWrongMatrix = SUNLS_ILL_INPUT;
 #endif
-
-SUNLinearSolver_Type get_type(SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; }
-SUNLinearSolver_ID get_id(SUNLinearSolver) { return SUNLINEARSOLVER_CUSTOM; }
-
-int initialize(SUNLinearSolver solver) {
-  content(solver).last_flag = kSuccess;
-  return kSuccess;
-}
 
 int setup(SUNLinearSolver solver, SUNMatrix A) {
   Content& c = content(solver);
-  if (!A || SUNMatGetID(A) != SUNMATRIX_DENSE || SM_ROWS_D(A) != c.size ||
-      SM_COLUMNS_D(A) != c.size) {
-    c.last_flag = kWrongMatrix;
-    return kWrongMatrix;
-  }
-  c.last_flag = c.lu.factor(SM_DATA_D(A), static_cast<int>(c.size));
-  return c.last_flag > 0 ? SUNLS_LUFACT_FAIL : kSuccess;
+  const bool right = A != nullptr && SUNMatGetID(A) == SUNMATRIX_DENSE && SM_ROWS_D(A) == c.size &&
+                     SM_COLUMNS_D(A) == c.size;
+  c.last_flag = right ? c.lu.factor(SM_DATA_D(A), static_cast<int>(c.size)) : kWrongMatrix;
+  return c.last_flag > 0 ? SUNLS_LUFACT_FAIL : static_cast<int>(c.last_flag);
 }
 
 int solve(SUNLinearSolver solver, SUNMatrix A, N_Vector x, N_Vector b, sunrealtype) {
-  Content& c = content(solver);
-  c.lu.solve(SM_DATA_D(A), NV_DATA_S(b), NV_DATA_S(x));
-  c.last_flag = kSuccess;
-  return kSuccess;
-}
-
-sunindextype last_flag(SUNLinearSolver solver) { return content(solver).last_flag; }
-
-int space(SUNLinearSolver, long* reals, long* integers) {
-  *reals = 0;
-  *integers = static_cast<long>(sizeof(Content) / sizeof(int));
-  return kSuccess;
+  content(solver).lu.solve(SM_DATA_D(A), NV_DATA_S(b), NV_DATA_S(x));
+  return 0;
 }
 
 int destroy(SUNLinearSolver solver) {
-  if (!solver) return kSuccess;
+  if (!solver) return 0;
   delete static_cast<Content*>(solver->content);
-  solver->content = nullptr;
   SUNLinSolFreeEmpty(solver);
-  return kSuccess;
+  return 0;
 }
 
 bool is_serial(N_Vector v) {
@@ -104,35 +82,31 @@ bool rounds_one_by_one(N_Vector like) {
   return true;
 }
 
-[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(what); }
+void require(bool right, const std::string& otherwise) {
+  if (!right) throw std::invalid_argument(otherwise);
+}
 
 /// `name` says whose argument it is.
 void require_serial(N_Vector v, const std::string& name) {
-  if (!v) refuse(name + " is null; want a vector of N_VNew_Serial or N_VMake_Serial");
-  const N_Vector_ID id =
-      v->ops && v->ops->nvgetvectorid ? v->ops->nvgetvectorid(v) : SUNDIALS_NVEC_CUSTOM;
-  if (id != SUNDIALS_NVEC_SERIAL || !v->content)
-    refuse(name + " is not a serial vector (N_VGetVectorID gives " + std::to_string(id) +
-           "); want one of N_VNew_Serial or N_VMake_Serial, others keep their own operations");
-}
-
-std::string size_of(SUNMatrix A) {
-  return std::to_string(SM_ROWS_D(A)) + " x " + std::to_string(SM_COLUMNS_D(A));
+  const std::string wanted = "; want a vector of N_VNew_Serial or N_VMake_Serial";
+  require(v != nullptr, name + " is null" + wanted);
+  require(is_serial(v), name + " is not a serial vector" + wanted);
 }
 
 void require_small_dense(N_Vector y, SUNMatrix A) {
   require_serial(y, "fast_dense_solver: y");
-  if (!A) refuse("fast_dense_solver: A is null; want a matrix of SUNDenseMatrix");
-  if (!A->ops || !A->ops->getid || A->ops->getid(A) != SUNMATRIX_DENSE)
-    refuse("fast_dense_solver: A is not a dense matrix; want one of SUNDenseMatrix");
-  if (SM_ROWS_D(A) != SM_COLUMNS_D(A))
-    refuse("fast_dense_solver: A is " + size_of(A) + "; want a square matrix");
-  if (SM_ROWS_D(A) != NV_LENGTH_S(y))
-    refuse("fast_dense_solver: A is " + size_of(A) + ", but y has " +
-           std::to_string(NV_LENGTH_S(y)) + " elements; want as many");
-  if (SM_ROWS_D(A) < 1 || SM_ROWS_D(A) > kLargestFastDense)
-    refuse("fast_dense_solver: A is " + size_of(A) + "; want 1 to " +
-           std::to_string(kLargestFastDense) + " rows (SUNLinSol_Dense takes any number)");
+  const std::string its = "fast_dense_solver: A is ";
+  require(A != nullptr, its + "null; want a matrix of SUNDenseMatrix");
+  require(A->ops->getid != nullptr && A->ops->getid(A) == SUNMATRIX_DENSE,
+          its + "not a dense matrix; want one of SUNDenseMatrix");
+  const sunindextype n = SM_ROWS_D(A);
+  const std::string size = its + std::to_string(n) + " x " + std::to_string(SM_COLUMNS_D(A));
+  require(n == SM_COLUMNS_D(A), size + "; want a square matrix");
+  require(n == NV_LENGTH_S(y),
+          size + ", but y has " + std::to_string(NV_LENGTH_S(y)) + " elements; want as many");
+  require(n >= 1 && n <= kLargestFastDense, size + "; want 1 to " +
+                                                std::to_string(kLargestFastDense) +
+                                                " rows (SUNLinSol_Dense takes any number)");
 }
 
 }  // namespace
@@ -173,14 +147,13 @@ SUNLinearSolver fast_dense_solver(N_Vector y, SUNMatrix A) {
   require_small_dense(y, A);
   SUNLinearSolver solver = SUNLinSolNewEmpty(y->sunctx);
   if (!solver) throw std::runtime_error("fast_dense_solver: SUNLinSolNewEmpty gave no solver");
-  solver->ops->gettype = get_type;
-  solver->ops->getid = get_id;
-  solver->ops->initialize = initialize;
-  solver->ops->setup = setup;
-  solver->ops->solve = solve;
-  solver->ops->lastflag = last_flag;
-  solver->ops->space = space;
-  solver->ops->free = destroy;
+  const SUNLinearSolver_Ops ops = solver->ops;
+  ops->gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
+  ops->getid = [](SUNLinearSolver) { return SUNLINEARSOLVER_CUSTOM; };
+  ops->setup = setup;
+  ops->solve = solve;
+  ops->lastflag = [](SUNLinearSolver s) { return content(s).last_flag; };
+  ops->free = destroy;
   auto* made = new Content;
   made->size = SM_ROWS_D(A);
   solver->content = made;

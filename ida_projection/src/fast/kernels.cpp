@@ -28,7 +28,6 @@ N_VectorContent_Serial content(N_Vector v) {
   return static_cast<N_VectorContent_Serial>(v->content);
 }
 double* data(N_Vector v) { return content(v)->data; }
-double* array_pointer(N_Vector v) { return data(v); }
 
 using Pair = double __attribute__((vector_size(16)));
 Pair pair_at(const double* x) {
@@ -76,24 +75,19 @@ struct Kernels {
     return total;
   }
 
-  /// use(f), f(x, y) = a x + b y as SUNDIALS rounds it.
-  template <class Use>
-  static void with_sum(sunrealtype a, sunrealtype b, Use use) {
-    if (b == 1.0)
-      use([=](double x, double y) { return a * x + y; });
-    else if (a == 1.0)
-      use([=](double x, double y) { return x + b * y; });
-    else if (a == b && a != -1.0)
-      use([=](double x, double y) { return a * (x + y); });
-    else if (a == -b)
-      use([=](double x, double y) { return a * (x - y); });
-    else
-      use([=](double x, double y) { return a * x + b * y; });
-  }
+  /// a x + b y as SUNDIALS rounds it.
   static void linear_sum(sunrealtype a, N_Vector X, sunrealtype b, N_Vector Y, N_Vector Z) {
-    with_sum(a, b, [=](auto f) {
-      each(Z, [=, x = data(X), y = data(Y)](auto i) { return f(x[i], y[i]); });
-    });
+    const double *x = data(X), *y = data(Y);
+    if (b == 1.0)
+      each(Z, [=](auto i) { return a * x[i] + y[i]; });
+    else if (a == 1.0)
+      each(Z, [=](auto i) { return x[i] + b * y[i]; });
+    else if (a == b && a != -1.0)
+      each(Z, [=](auto i) { return a * (x[i] + y[i]); });
+    else if (a == -b)
+      each(Z, [=](auto i) { return a * (x[i] - y[i]); });
+    else
+      each(Z, [=](auto i) { return a * x[i] + b * y[i]; });
   }
   static void constant(sunrealtype c, N_Vector Z) {
     each(Z, [=](auto) { return c; });
@@ -110,46 +104,25 @@ struct Kernels {
   static void add_constant(N_Vector X, sunrealtype b, N_Vector Z) {
     each(Z, [=, x = data(X)](auto i) { return x[i] + b; });
   }
-  static void product(N_Vector X, N_Vector Y, N_Vector Z) {
-    each(Z, [x = data(X), y = data(Y)](auto i) { return x[i] * y[i]; });
-  }
-  static void quotient(N_Vector X, N_Vector Y, N_Vector Z) {
-    each(Z, [x = data(X), y = data(Y)](auto i) { return x[i] / y[i]; });
-  }
 
-  static sunrealtype dot(N_Vector X, N_Vector Y) {
-    return sum(X, [x = data(X), y = data(Y)](auto read, auto i) {
-      return read.at(x + i) * read.at(y + i);
-    });
-  }
-  static sunrealtype minimum(N_Vector X) {
-    const double* x = data(X);
-    double least = x[0];
-    for (sunindextype i = 1; i < length(X); ++i) least = x[i] < least ? x[i] : least;
-    return least;
-  }
-  static double square_sum(N_Vector X, N_Vector W) {
-    return sum(X, [x = data(X), w = data(W)](auto read, auto i) {
-      const auto share = read.at(x + i) * read.at(w + i);
-      return share * share;
-    });
-  }
   static sunrealtype wrms_norm(N_Vector X, N_Vector W) {
-    return root(square_sum(X, W) / static_cast<double>(length(X)));
+    return mean_root(X, sum(X, [x = data(X), w = data(W)](auto read, auto i) {
+                       const auto share = read.at(x + i) * read.at(w + i);
+                       return share * share;
+                     }));
   }
-  static sunrealtype wl2_norm(N_Vector X, N_Vector W) { return root(square_sum(X, W)); }
-
   // Masked elements add 0, which changes no sum of squares.
   static sunrealtype wrms_norm_mask(N_Vector X, N_Vector W, N_Vector Mask) {
-    const double squares = sum(X, [x = data(X), w = data(W), m = data(Mask)](auto read, auto i) {
-      const auto share = read.at(x + i) * read.at(w + i);
-      return where_positive(read.at(m + i), share * share);
-    });
-    return root(squares / static_cast<double>(length(X)));
+    return mean_root(X, sum(X, [x = data(X), w = data(W), m = data(Mask)](auto read, auto i) {
+                       const auto share = read.at(x + i) * read.at(w + i);
+                       return where_positive(read.at(m + i), share * share);
+                     }));
   }
-
   // SUNRsqrt: 0 for what is negative; what is no number stays none.
-  static double root(double square) { return square <= 0.0 ? 0.0 : std::sqrt(square); }
+  static double mean_root(N_Vector X, double squares) {
+    const double mean = squares / static_cast<double>(length(X));
+    return mean <= 0.0 ? 0.0 : std::sqrt(mean);
+  }
 
   /// Size elements from `first` on, two at a time.
   template <int Size>
@@ -202,47 +175,16 @@ struct Kernels {
     inverse(X, Z);
   }
 
-  // As SUNDIALS' own one, where a program has enabled it.
-  static int enabled_linear_combination(int count, sunrealtype* c, N_Vector* X, N_Vector Z) {
-    if (count == 2) {
-      linear_sum(c[0], X[0], c[1], X[1], Z);
-      return 0;
-    }
-    return linear_combination(count, c, X, Z);
-  }
-
-  static int linear_sums(int count, sunrealtype a, N_Vector* X, sunrealtype b, N_Vector* Y,
-                         N_Vector* Z) {
-    with_sum(a, b, [=](auto f) {
-      for (int k = 0; k < count; ++k)
-        each(Z[k], [=, x = data(X[k]), y = data(Y[k])](auto i) { return f(x[i], y[i]); });
-    });
-    return 0;
-  }
-  static int scale_each(int count, sunrealtype* c, N_Vector* X, N_Vector* Z) {
-    for (int k = 0; k < count; ++k) scale(c[k], X[k], Z[k]);
-    return 0;
-  }
-
   static void install(N_Vector_Ops ops, bool spreading) {
-    ops->nvgetarraypointer = array_pointer;
     ops->nvlinearsum = linear_sum;
     ops->nvconst = constant;
-    ops->nvprod = product;
-    ops->nvdiv = quotient;
     ops->nvscale = scale;
     ops->nvabs = absolute;
     ops->nvinv = inverse;
     ops->nvaddconst = add_constant;
-    ops->nvdotprod = dot;
-    ops->nvmin = minimum;
     ops->nvwrmsnorm = wrms_norm;
     ops->nvwrmsnormmask = wrms_norm_mask;
-    ops->nvwl2norm = wl2_norm;
-    ops->nvlinearcombination =
-        ops->nvlinearcombination ? enabled_linear_combination : linear_combination;
-    ops->nvlinearsumvectorarray = linear_sums;
-    ops->nvscalevectorarray = scale_each;
+    if (!ops->nvlinearcombination) ops->nvlinearcombination = linear_combination;
     if (!spreading) return;
     ops->nvlinearcombination = combination_of_others;
     ops->nvscale = scale_of_other;

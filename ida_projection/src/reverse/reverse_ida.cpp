@@ -31,32 +31,6 @@ constexpr std::size_t kStack = std::size_t{1} << 20;
 void free_context(SUNContext context) { SUNContext_Free(&context); }
 void free_ida(void* mem) { IDAFree(&mem); }
 
-/// A function on a stack of its own, which can be left and entered again. `body` must not throw. If
-/// it was ever entered it has to return before the Fiber is destroyed: Boost would unwind its stack
-/// by an exception, which must not pass through frames of C.
-class Fiber {
- public:
-  template <class Body>
-  Fiber(std::size_t stack, Body body)
-      : inside_(std::allocator_arg, boost::context::protected_fixedsize_stack(stack),
-                [this, body = std::move(body)](boost::context::fiber&& caller) mutable {
-                  outside_ = std::move(caller);
-                  body();
-                  return std::move(outside_);
-                }) {}
-  Fiber(const Fiber&) = delete;
-  Fiber& operator=(const Fiber&) = delete;
-
-  /// Runs the body until it leaves or ends.
-  void enter() { inside_ = std::move(inside_).resume(); }
-  /// Called by the body: goes back to where it was entered.
-  void leave() { outside_ = std::move(outside_).resume(); }
-  bool ended() const { return !inside_; }
-
- private:
-  boost::context::fiber inside_, outside_;
-};
-
 SUNContext new_context() {
   SUNContext context = nullptr;
 #ifdef SUN_COMM_NULL  // SUNDIALS 7
@@ -74,34 +48,33 @@ Pointer made(Pointer pointer) {
   return pointer;
 }
 
-[[noreturn]] void refuse(const std::string& argument, const std::string& value,
-                         const std::string& allowed) {
-  throw std::invalid_argument("ReverseIda: " + argument + " = " + value + ", must be " + allowed);
+void require(bool right, const std::string& argument, double value, const char* allowed) {
+  if (!right)
+    throw std::invalid_argument("ReverseIda: " + argument + " = " + tp::shortest(value) +
+                                ", must be " + allowed);
 }
 
 void check(const Equations& e) {
   const std::size_t n = e.y.size();
-  const auto length = [&](const char* name, std::size_t size, const char* allowed) {
-    refuse(std::string(name) + ".size()", std::to_string(size), allowed);
+  const auto sized = [](bool right, const char* name, std::size_t size, const char* allowed) {
+    require(right, std::string(name) + ".size()", static_cast<double>(size), allowed);
   };
-  if (n == 0) length("y", n, "at least 1");
-  if (e.yp.size() != n) length("yp", e.yp.size(), "that of y");
-  if (e.atol.size() != 1 && e.atol.size() != n) length("atol", e.atol.size(), "1 or that of y");
-  if (!e.id.empty() && e.id.size() != n) length("id", e.id.size(), "0 or that of y");
-  const auto finite = [&](const char* name, const std::vector<double>& values) {
+  sized(n >= 1, "y", n, "at least 1");
+  sized(e.yp.size() == n, "yp", e.yp.size(), "that of y");
+  sized(e.atol.size() == 1 || e.atol.size() == n, "atol", e.atol.size(), "1 or that of y");
+  sized(e.id.empty() || e.id.size() == n, "id", e.id.size(), "0 or that of y");
+  const auto finite = [](const char* name, const std::vector<double>& values) {
     for (std::size_t i = 0; i < values.size(); ++i)
-      if (!std::isfinite(values[i]))
-        refuse(std::string(name) + "[" + std::to_string(i) + "]", tp::shortest(values[i]),
-               "finite");
+      require(std::isfinite(values[i]), std::string(name) + "[" + std::to_string(i) + "]",
+              values[i], "finite");
   };
   finite("y", e.y), finite("yp", e.yp), finite("atol", e.atol), finite("id", e.id);
-  if (!std::isfinite(e.t0)) refuse("t0", tp::shortest(e.t0), "finite");
-  if (!(e.rtol >= 0) || !std::isfinite(e.rtol)) refuse("rtol", tp::shortest(e.rtol), ">= 0");
-  for (const double a : e.atol)
-    if (a < 0) refuse("atol", tp::shortest(a), ">= 0");
-  if (e.constraints < 0) refuse("constraints", std::to_string(e.constraints), ">= 0");
-  if (!e.names.empty() && e.names.size() != static_cast<std::size_t>(e.constraints))
-    length("names", e.names.size(), "0 or the number of constraints");
+  require(std::isfinite(e.t0), "t0", e.t0, "finite");
+  require(e.rtol >= 0.0 && std::isfinite(e.rtol), "rtol", e.rtol, ">= 0");
+  for (const double a : e.atol) require(a >= 0.0, "atol", a, ">= 0");
+  require(e.constraints >= 0, "constraints", e.constraints, ">= 0");
+  sized(e.names.empty() || e.names.size() == static_cast<std::size_t>(e.constraints), "names",
+        e.names.size(), "0 or the number of constraints");
 }
 
 }  // namespace
@@ -123,11 +96,19 @@ class ReverseIda::Implementation {
         context_(new_context()),
         y_(vector(equations_.y)),
         yp_(vector(equations_.yp)),
-        fiber_(kStack, [this] { run_commands(); }) {
+        inside_(std::allocator_arg, boost::context::protected_fixedsize_stack(kStack),
+                [this](boost::context::fiber&& caller) {
+                  outside_ = std::move(caller);
+                  run_commands();
+                  return std::move(outside_);
+                }) {
     mem_.reset(made(IDACreate(context_.get())));
     expect(IDAInit(mem_.get(), residual, equations_.t0, y_.get(), yp_.get()), "IDAInit");
     expect(IDASetUserData(mem_.get(), this), "IDASetUserData");
-    set_tolerances();
+    std::vector<double> each = equations_.atol;
+    each.resize(equations_.y.size(), each.front());
+    const tp::Owned<N_Vector, N_VDestroy> atol(vector(each));
+    expect(IDASVtolerances(mem_.get(), equations_.rtol, atol.get()), "IDASVtolerances");
     set_linear_solver();
     if (!equations_.id.empty()) {
       id_.reset(vector(equations_.id));
@@ -151,8 +132,7 @@ class ReverseIda::Implementation {
 #else
     SUNContext_ClearErrHandlers(context_.get());
 #endif
-    if (started_)
-      while (!fiber_.ended()) fiber_.enter();
+    while (started_ && inside_) enter();
   }
 
   Implementation(const Implementation&) = delete;
@@ -217,15 +197,6 @@ class ReverseIda::Implementation {
     if (flag < 0)
       throw std::runtime_error(std::string("ReverseIda: ") + function + " returned " +
                                std::to_string(flag));
-  }
-
-  void set_tolerances() {
-    if (equations_.atol.size() == 1) {
-      expect(IDASStolerances(mem_.get(), equations_.rtol, equations_.atol[0]), "IDASStolerances");
-      return;
-    }
-    const tp::Owned<N_Vector, N_VDestroy> atol(vector(equations_.atol));
-    expect(IDASVtolerances(mem_.get(), equations_.rtol, atol.get()), "IDASVtolerances");
   }
 
   void set_linear_solver() {
@@ -301,10 +272,13 @@ class ReverseIda::Implementation {
     asked_ = {request, t, asked_.cj, y, yp, rhs, result, size};
     const double reached = t_;
     t_ = asked_.t;
-    fiber_.leave();
+    leave();
     t_ = reached;
     return abandoned_ ? -1 : asked_.answer;
   }
+
+  void enter() { inside_ = std::move(inside_).resume(); }
+  void leave() { outside_ = std::move(outside_).resume(); }
 
   template <class Command>
   Request start(Command command) {
@@ -318,7 +292,7 @@ class ReverseIda::Implementation {
   Request resume() {
     task_.waiting = false;
     started_ = true;
-    fiber_.enter();
+    enter();
     if (!task_.waiting) return asked_.request;  // a request
     task_.command = nullptr;
     at_rest(task_.flag < 0 || task_.thrown ? Request::failed : Request::reached);
@@ -339,7 +313,7 @@ class ReverseIda::Implementation {
         task_.thrown = std::current_exception();
       }
       task_.waiting = true;
-      if (!abandoned_) fiber_.leave();
+      if (!abandoned_) leave();
     }
   }
 
@@ -363,7 +337,10 @@ class ReverseIda::Implementation {
   Question asked_;
   Task task_;
   bool abandoned_ = false, started_ = false;
-  Fiber fiber_;  // destroyed first
+  // IDA runs on the stack of inside_, and goes back to the caller by outside_. Once entered,
+  // inside_ has to end before it is destroyed: Boost would unwind its stack by an exception, which
+  // must not pass through frames of C.
+  boost::context::fiber inside_, outside_;
 };
 
 ReverseIda::ReverseIda(Equations equations, const ida_projection::SundialsBuild& host) {
@@ -372,37 +349,29 @@ ReverseIda::ReverseIda(Equations equations, const ida_projection::SundialsBuild&
   implementation_ = std::make_unique<Implementation>(std::move(equations));
 }
 
+ReverseIda::Implementation& ReverseIda::its() const {
+  return tp::owned("ReverseIda", implementation_);
+}
 ReverseIda::~ReverseIda() = default;
 ReverseIda::ReverseIda(ReverseIda&&) noexcept = default;
 ReverseIda& ReverseIda::operator=(ReverseIda&&) noexcept = default;
 
-namespace {
-
-template <class Pointer>
-auto& its(const Pointer& implementation) {
-  return tp::owned("ReverseIda", implementation);
-}
-
-}  // namespace
-
-Request ReverseIda::solve(double tout, bool one_step) {
-  return its(implementation_).solve(tout, one_step);
-}
-Request ReverseIda::make_consistent() { return its(implementation_).make_consistent(); }
-Request ReverseIda::go_on(int answer) { return its(implementation_).go_on(answer); }
-Request ReverseIda::request() const { return its(implementation_).asked_.request; }
-double ReverseIda::t() const { return its(implementation_).t_; }
-double ReverseIda::cj() const { return its(implementation_).asked_.cj; }
-const double* ReverseIda::y() const { return its(implementation_).asked_.y; }
-const double* ReverseIda::yp() const { return its(implementation_).asked_.yp; }
-const double* ReverseIda::rhs() const { return its(implementation_).asked_.rhs; }
-double* ReverseIda::result() const { return its(implementation_).asked_.result; }
-std::size_t ReverseIda::result_size() const { return its(implementation_).asked_.result_size; }
-int ReverseIda::flag() const { return its(implementation_).task_.flag; }
-std::string ReverseIda::message() const { return its(implementation_).task_.message; }
-void* ReverseIda::ida_mem() const { return its(implementation_).mem_.get(); }
+Request ReverseIda::solve(double tout, bool one_step) { return its().solve(tout, one_step); }
+Request ReverseIda::make_consistent() { return its().make_consistent(); }
+Request ReverseIda::go_on(int answer) { return its().go_on(answer); }
+Request ReverseIda::request() const { return its().asked_.request; }
+double ReverseIda::t() const { return its().t_; }
+double ReverseIda::cj() const { return its().asked_.cj; }
+const double* ReverseIda::y() const { return its().asked_.y; }
+const double* ReverseIda::yp() const { return its().asked_.yp; }
+const double* ReverseIda::rhs() const { return its().asked_.rhs; }
+double* ReverseIda::result() const { return its().asked_.result; }
+std::size_t ReverseIda::result_size() const { return its().asked_.result_size; }
+int ReverseIda::flag() const { return its().task_.flag; }
+std::string ReverseIda::message() const { return its().task_.message; }
+void* ReverseIda::ida_mem() const { return its().mem_.get(); }
 const ida_projection::Projection* ReverseIda::projection() const {
-  const auto& projection = its(implementation_).projection_;
+  const auto& projection = its().projection_;
   return projection ? &*projection : nullptr;
 }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <memory>
 #include <mpi.h>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tether/ida_projection/constraints.hpp>
@@ -22,65 +23,38 @@ class GhostExchange {
   /// `ids`: the global numbers of this rank's ghosts. Throws std::invalid_argument, on every rank,
   /// where a number is none, or one of this rank's own.
   GhostExchange(MPI_Comm comm, int unknowns, std::vector<long long> ids)
-      : comm_(comm), ids_(std::move(ids)) {
-    int ranks = 1;
+      : comm_(comm), ids_(std::move(ids)), places_(ids_.size()), held_(ids_.size()) {
+    int ranks = 1, rank = 0;
     MPI_Comm_size(comm_, &ranks);
+    MPI_Comm_rank(comm_, &rank);
     std::vector<long long> first(static_cast<std::size_t>(ranks) + 1, 0);
     const long long own = unknowns;
     MPI_Allgather(&own, 1, MPI_LONG_LONG, first.data() + 1, 1, MPI_LONG_LONG, comm_);
-    for (std::size_t r = 1; r < first.size(); ++r) first[r] += first[r - 1];
-    int rank = 0;
-    MPI_Comm_rank(comm_, &rank);
+    std::partial_sum(first.begin(), first.end(), first.begin());
     first_ = first[static_cast<std::size_t>(rank)];
+    refuse_wrong(unknowns, first.back());
 
-    // The wishes of this rank to each, and then of each to this one.
-    const auto n = static_cast<std::size_t>(ranks);
-    std::vector<std::vector<long long>> wanted(n);
-    std::vector<std::vector<int>> places(n);
-    long long bad = -1;
-    for (std::size_t k = 0; k < ids_.size(); ++k) {
-      const long long id = ids_[k];
-      const bool here = id >= first_ && id < first_ + unknowns;
-      if (id < 0 || id >= first.back() || here) {
-        bad = static_cast<long long>(k);
-        break;
-      }
-      const auto owner = static_cast<std::size_t>(std::upper_bound(first.begin(), first.end(), id) -
-                                                  first.begin() - 1);
-      wanted[owner].push_back(id - first[owner]);
-      places[owner].push_back(static_cast<int>(k));
+    // Ghosts by their owners, who are told which unknowns are copied.
+    std::iota(places_.begin(), places_.end(), std::size_t{0});
+    std::stable_sort(places_.begin(), places_.end(),
+                     [this](std::size_t a, std::size_t b) { return ids_[a] < ids_[b]; });
+    std::vector<long long> wanted;
+    for (const std::size_t k : places_) wanted.push_back(ids_[k]);
+    for (std::size_t r = 0; r + 1 < first.size(); ++r) {
+      const auto begin = std::lower_bound(wanted.begin(), wanted.end(), first[r]);
+      ghosts_.starts.push_back(static_cast<int>(begin - wanted.begin()));
+      ghosts_.counts.push_back(
+          static_cast<int>(std::lower_bound(begin, wanted.end(), first[r + 1]) - begin));
     }
-    int failed = bad >= 0 ? 1 : 0;
-    MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm_);
-    if (failed != 0)
-      throw std::invalid_argument(
-          bad < 0 ? std::string("GhostExchange: another rank has a wrong number of a ghost")
-                  : "GhostExchange: ghost " + std::to_string(bad) + " copies unknown " +
-                        std::to_string(ids_[static_cast<std::size_t>(bad)]) + "; it must be 0 .. " +
-                        std::to_string(first.back() - 1) + " and not this rank's own");
-    std::vector<int> asked(n), asking(n);
-    for (std::size_t r = 0; r < n; ++r) asked[r] = static_cast<int>(wanted[r].size());
-    MPI_Alltoall(asked.data(), 1, MPI_INT, asking.data(), 1, MPI_INT, comm_);
-    std::vector<MPI_Request> open;
-    std::vector<std::vector<long long>> of_others(n);
-    for (std::size_t r = 0; r < n; ++r) {
-      of_others[r].resize(static_cast<std::size_t>(asking[r]));
-      if (asking[r] > 0)
-        MPI_Irecv(of_others[r].data(), asking[r], MPI_LONG_LONG, static_cast<int>(r), kTag, comm_,
-                  &open.emplace_back());
-      if (asked[r] > 0)
-        MPI_Isend(wanted[r].data(), asked[r], MPI_LONG_LONG, static_cast<int>(r), kTag, comm_,
-                  &open.emplace_back());
-    }
-    MPI_Waitall(static_cast<int>(open.size()), open.data(), MPI_STATUSES_IGNORE);
-    for (std::size_t r = 0; r < n; ++r) {
-      if (asked[r] > 0) ghosts_.push_back({static_cast<int>(r), std::move(places[r])});
-      if (asking[r] > 0)
-        owned_.push_back({static_cast<int>(r), {of_others[r].begin(), of_others[r].end()}});
-    }
-    for (const bool own_part : {false, true})
-      for (const Part& part : own_part ? owned_ : ghosts_)
-        (own_part ? out_ : in_).emplace_back(part.places.size());
+    owned_ = ghosts_;
+    MPI_Alltoall(ghosts_.counts.data(), 1, MPI_INT, owned_.counts.data(), 1, MPI_INT, comm_);
+    for (std::size_t r = 1; r < owned_.starts.size(); ++r)
+      owned_.starts[r] = owned_.starts[r - 1] + owned_.counts[r - 1];
+    std::vector<long long> asked(
+        static_cast<std::size_t>(owned_.starts.back() + owned_.counts.back()));
+    exchange(wanted, ghosts_, asked, owned_, MPI_LONG_LONG);
+    for (const long long id : asked) copied_.push_back(id - first_);
+    sent_.resize(copied_.size());
   }
 
   long long first() const { return first_; }  ///< global number of this rank's first unknown
@@ -89,47 +63,49 @@ class GhostExchange {
 
   /// ghosts <- the unknowns that they copy.
   void update(const double* own, double* ghosts) {
-    for (std::size_t k = 0; k < owned_.size(); ++k)
-      for (std::size_t i = 0; i < out_[k].size(); ++i) out_[k][i] = own[owned_[k].places[i]];
-    exchange(owned_, out_, ghosts_, in_);
-    for (std::size_t k = 0; k < ghosts_.size(); ++k)
-      for (std::size_t i = 0; i < in_[k].size(); ++i) ghosts[ghosts_[k].places[i]] = in_[k][i];
+    for (std::size_t i = 0; i < copied_.size(); ++i) sent_[i] = own[copied_[i]];
+    exchange(sent_, owned_, held_, ghosts_, MPI_DOUBLE);
+    for (std::size_t i = 0; i < places_.size(); ++i) ghosts[places_[i]] = held_[i];
   }
   /// own <- own + what the ghosts of it hold, in the order of the ranks.
   void add(const double* ghosts, double* own) {
-    for (std::size_t k = 0; k < ghosts_.size(); ++k)
-      for (std::size_t i = 0; i < in_[k].size(); ++i) in_[k][i] = ghosts[ghosts_[k].places[i]];
-    exchange(ghosts_, in_, owned_, out_);
-    for (std::size_t k = 0; k < owned_.size(); ++k)
-      for (std::size_t i = 0; i < out_[k].size(); ++i) own[owned_[k].places[i]] += out_[k][i];
+    for (std::size_t i = 0; i < places_.size(); ++i) held_[i] = ghosts[places_[i]];
+    exchange(held_, ghosts_, sent_, owned_, MPI_DOUBLE);
+    for (std::size_t i = 0; i < copied_.size(); ++i) own[copied_[i]] += sent_[i];
   }
 
  private:
-  struct Part {
-    int rank;
-    std::vector<int> places;
+  struct Parts {  // of an array, one for each rank
+    std::vector<int> counts, starts;
   };
-  using Buffers = std::vector<std::vector<double>>;
 
-  void exchange(const std::vector<Part>& to, const Buffers& sent, const std::vector<Part>& from,
-                Buffers& received) {
-    open_.clear();
-    for (std::size_t k = 0; k < from.size(); ++k)
-      MPI_Irecv(received[k].data(), static_cast<int>(received[k].size()), MPI_DOUBLE, from[k].rank,
-                kTag, comm_, &open_.emplace_back());
-    for (std::size_t k = 0; k < to.size(); ++k)
-      MPI_Isend(sent[k].data(), static_cast<int>(sent[k].size()), MPI_DOUBLE, to[k].rank, kTag,
-                comm_, &open_.emplace_back());
-    MPI_Waitall(static_cast<int>(open_.size()), open_.data(), MPI_STATUSES_IGNORE);
+  template <class Number>
+  void exchange(const std::vector<Number>& out, const Parts& to, std::vector<Number>& in,
+                const Parts& from, MPI_Datatype type) {
+    MPI_Alltoallv(out.data(), to.counts.data(), to.starts.data(), type, in.data(),
+                  from.counts.data(), from.starts.data(), type, comm_);
+  }
+  void refuse_wrong(int unknowns, long long all) const {
+    const auto bad = std::find_if(ids_.begin(), ids_.end(), [&](long long id) {
+      return id < 0 || id >= all || (id >= first_ && id < first_ + unknowns);
+    });
+    int failed = bad != ids_.end() ? 1 : 0;
+    MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm_);
+    if (failed == 0) return;
+    throw std::invalid_argument(
+        bad == ids_.end() ? std::string("GhostExchange: another rank has a wrong number of a ghost")
+                          : "GhostExchange: ghost " + std::to_string(bad - ids_.begin()) +
+                                " copies unknown " + std::to_string(*bad) + "; it must be 0 .. " +
+                                std::to_string(all - 1) + " and not this rank's own");
   }
 
-  static constexpr int kTag = 7261;
   MPI_Comm comm_;
   std::vector<long long> ids_;
   long long first_ = 0;
-  std::vector<Part> ghosts_, owned_;  // by rank: ghosts here, and unknowns with ghosts there
-  Buffers in_, out_;                  // of ghosts_, of owned_
-  std::vector<MPI_Request> open_;
+  Parts ghosts_, owned_;             // ghosts here, and copies elsewhere of unknowns here
+  std::vector<std::size_t> places_;  // of each ghost, in the order of owners
+  std::vector<long long> copied_;    // the unknown of each copy
+  std::vector<double> held_, sent_;  // their values, in the same orders
 };
 
 /// DistributedRows without `fill` for rows that this rank gives by global columns: entries
