@@ -13,32 +13,6 @@
 
 namespace tether::ida_projection {
 
-namespace {
-
-// The candidate as the searches want it.
-struct Point {
-  std::vector<double> y, WT;
-
-  explicit Point(const Candidate& candidate)
-      : y(static_cast<std::size_t>(N_VGetLength(candidate.base))), WT(y) {
-    for (std::size_t j = 0; j < y.size(); ++j) {
-      const double w = candidate.weight_entries[j];
-      y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
-      WT[j] = w > 0.0 ? 1.0 / w : 0.0;
-    }
-  }
-  // Most unknowns below their tolerances: the error test cannot see them.
-  std::string large_tolerances() const {
-    std::size_t below = 0;
-    for (std::size_t j = 0; j < y.size(); ++j) below += std::abs(y[j]) < WT[j] ? 1U : 0U;
-    if (2 * below <= y.size()) return {};
-    return "; " + std::to_string(below) + " of " + std::to_string(y.size()) +
-           " unknowns are smaller than their tolerances: reduce atol";
-  }
-};
-
-}  // namespace
-
 void Observer::reset_statistics() {
   statistics_ = Statistics{};
   tally_ = Tally();
@@ -119,11 +93,16 @@ std::string Observer::too_high_index() const {
          "y' in their place, and give these equations as rows";
 }
 
-std::string Observer::rounding_of_multipliers() const {
-  return variables_.high_index()
-             ? "; in forms of index 2 or more multipliers carry rounding divided by the step, "
-               "which may not allow this tolerance: try a larger one, or a form of index 1 or 0"
-             : "";
+std::string Observer::trouble_of_multipliers() const {
+  if (!variables_.high_index()) return {};
+  if (!run_.undetermined.empty()) return "; " + run_.undetermined;
+  const std::string index = too_high_index();
+  return "; " +
+         (index.empty()
+              ? "in forms of index 2 or more multipliers carry rounding divided by the step, "
+                "which may not allow this tolerance: try a larger one, or a form of index 1 "
+                "or 0"
+              : index);
 }
 
 std::string Observer::explained(Status outcome, const std::string& text) const {
@@ -135,12 +114,8 @@ std::string Observer::explained(Status outcome, const std::string& text) const {
 void Observer::corrector_failed(const Candidate& candidate, int flag) {
   ++statistics_.corrector_failures;
   report_.status = Status::corrector_failed;
-  const std::string index = too_high_index();
-  if (!index.empty())
-    report_.message = "IDA's corrector failed; " + index;
-  else if (variables_.high_index())
-    report_.message = "IDA's corrector failed" + rounding_of_multipliers() +
-                      (run_.undetermined.empty() ? "" : "; " + run_.undetermined);
+  const std::string cause = trouble_of_multipliers();
+  if (!cause.empty()) report_.message = "IDA's corrector failed" + cause;
   if (flag <= 0 || candidate.base_entries == nullptr ||
       corrector_.failures_in_row() != Report::kSayAfter)
     return;
@@ -156,7 +131,6 @@ void Observer::end_window(long steps) {
   if (3 * run_.refused_steps > kWindow) run_.refused = true;
   run_.window_begin = steps;
   run_.refused_steps = 0;
-  if (!run_.refused) run_.rejections_before = run_.rejections;
 }
 
 void Observer::tell_progress(const Attempt& attempt) {
@@ -168,70 +142,54 @@ void Observer::tell_progress(const Attempt& attempt) {
 
 // False: the run is hopeless.
 bool Observer::goes_on(const Attempt& attempt, const Candidate& candidate) {
-  if (run_.standing >= kWindow) {  // steps shorter than the rounding of t
+  if (run_.standing >= kWindow) {
     report_.warn(Status::collapsed, "t stands at " + brief(attempt.t) +
                                         ": steps are shorter than its rounding" +
-                                        rounding_of_multipliers());
+                                        trouble_of_multipliers());
     return false;
   }
-  const bool false_row = first_steps_.false_row_found();
+  const bool false_row = faults_.false_row_found();
   const bool collapsed = run_.refused || (false_row && run_.moved_in_row >= kMostMovedByFalseRow);
   if (!collapsed || report_.warning() == Status::collapsed) return true;
-  const std::string doubt = report_.warning() == Status::doubtful ? report_.warning_text() : "";
-  const std::string text = cause(attempt, candidate, doubt);
-  report_.warn(Status::collapsed, text,
-               doubt.empty() ? text : text.substr(0, text.rfind("; " + doubt)));
+  report_.warn(Status::collapsed, cause(attempt, candidate));
   return !false_row;
 }
 
-// Why most steps are rejected, found at the corrector's point, where y' = yppred + cj ycor
-// satisfies F. `doubt`: a cause that was found before.
-std::string Observer::cause(const Attempt& attempt, const Candidate& candidate,
-                            const std::string& doubt) {
-  std::string text = run_.refused ? "IDA rejected " +
-                                        std::to_string(run_.rejections - run_.rejections_before) +
-                                        " attempts in the last " + std::to_string(kWindow) +
-                                        " accepted steps before t = " + brief(attempt.t)
-                                  : "each of the last " + std::to_string(run_.moved_in_row) +
-                                        " steps before t = " + brief(attempt.t) +
-                                        " was moved by about what the error test allows";
-  if (variables_.all())
-    text +=
-        "; the id vector calls every variable algebraic: differential ones have to be 1 "
-        "(Options::id)";
-  std::string row = doubt;
-  if (candidate.base_entries != nullptr) {
-    const Point at(candidate);
-    text += at.large_tolerances();
-    if (faults_.may_search(at.y.size())) {
-      const std::string entry = faults_.wrong_entry(candidate.t, at.y);
-      if (!entry.empty()) row = "check_jacobian finds there: " + entry;
-      if (row.empty()) {
-        std::vector<double> yp(at.y);
-        for (std::size_t j = 0; j < yp.size(); ++j)
-          yp[j] = candidate.predicted_rate[j] + candidate.cj * candidate.correction_entries[j];
-        row = faults_.unkept(candidate.t, at.y, yp, at.WT);
-      }
-      faults_.pass_end_to(corrector_);
-    }
+// Why most steps are rejected, found at the corrector's point.
+std::string Observer::cause(const Attempt& attempt, const Candidate& candidate) {
+  const std::string found = wrong_entry(candidate);
+  return (run_.refused ? "IDA rejected attempts at many of the last " + std::to_string(kWindow)
+                       : "each of the last " + std::to_string(run_.moved_in_row)) +
+         " steps before t = " + brief(attempt.t) +
+         (run_.refused ? "" : " was moved by about what the error test allows") +
+         (found.empty() && report_.warning() != Status::doubtful
+              ? "; check the rows with check_jacobian, the id vector and the tolerances"
+              : found);
+}
+
+// "; check_jacobian finds there: ...". Any row bends over tolerances that exceed most unknowns.
+std::string Observer::wrong_entry(const Candidate& candidate) {
+  if (candidate.base_entries == nullptr) return {};
+  std::vector<double> y(static_cast<std::size_t>(N_VGetLength(candidate.base)));
+  std::size_t below = 0;
+  for (std::size_t j = 0; j < y.size(); ++j) {
+    y[j] = candidate.base_entries[j] + candidate.correction_entries[j];
+    below += std::abs(y[j]) * candidate.weight_entries[j] < 1.0 ? 1U : 0U;
   }
-  if (row.empty()) row = "check the rows with check_jacobian, the id vector and the tolerances";
-  return text + "; " + row;
+  const std::string entry = faults_.wrong_entry(candidate.t, y);
+  if (!entry.empty()) return "; check_jacobian finds there: " + entry;
+  if (2 * below <= y.size()) return {};
+  return "; " + std::to_string(below) + " of " + std::to_string(y.size()) +
+         " unknowns are smaller than their tolerances: reduce atol";
 }
 
 // If moves do not converge C is wrong, as a rule; the candidate is where they have led, and y' need
 // not fulfil F there. Looked for once in a step, and only if it is printed.
 std::string Observer::suspicion(const Attempt& attempt, const Candidate& candidate,
                                 Status outcome) {
-  if (outcome != Status::not_converged || !report_.prints_failures(attempt.steps) ||
-      candidate.base_entries == nullptr)
-    return {};
-  if (std::exchange(run_.suspected, attempt.steps) == attempt.steps) return run_.suspicion;
-  const Point at(candidate);
-  const std::string entry =
-      faults_.may_search(at.y.size()) ? faults_.wrong_entry(candidate.t, at.y) : std::string();
-  run_.suspicion = entry.empty() ? at.large_tolerances()  // any row bends over these
-                                 : "; check_jacobian finds there: " + entry;
+  if (outcome != Status::not_converged || !report_.prints_failures(attempt.steps)) return {};
+  if (std::exchange(run_.suspected, attempt.steps) != attempt.steps)
+    run_.suspicion = wrong_entry(candidate);
   return run_.suspicion;
 }
 
@@ -253,9 +211,9 @@ void Observer::check_rows(const Attempt& attempt, const Candidate& candidate, N_
                           RowsAt& rows) {
   if (report_.warning() != Status::success || !in_use(Mechanism::false_row_watch)) return;
   const std::string doubt =
-      first_steps_.check(candidate, attempt, corrected, variables_, rows, corrector_);
+      faults_.check(candidate, attempt, corrected, variables_, rows, corrector_);
   if (!doubt.empty()) report_.warn(Status::doubtful, doubt);
-  if (report_.advice.empty()) report_.advice = first_steps_.idle_row();
+  if (report_.advice.empty()) report_.advice = faults_.idle_row();
 }
 
 // From a start off the constraints moves do not shrink with the step. Above Advanced::largest_move

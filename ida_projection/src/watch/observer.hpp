@@ -10,8 +10,8 @@
 
 #include "host/ida_lifetime.hpp"
 #include "step/attempt.hpp"
-#include "watch/first_steps.hpp"
 #include "watch/report.hpp"
+#include "watch/row_faults.hpp"
 
 namespace tether::ida_projection {
 
@@ -29,11 +29,10 @@ class Observer {
         lifetime_(lifetime),
         corrector_(corrector),
         variables_(variables),
-        faults_(constraints, statistics),
-        first_steps_(constraints, faults_) {}
+        faults_(constraints, statistics) {}
 
   void attached() { bypass_.at_attach = ida_.steps(); }
-  void reset() { run_ = Run(), first_steps_.reset(); }  ///< a new run starts
+  void reset() { run_ = Run(), faults_.reset(); }  ///< a new run starts
   void reset_statistics();
   Statistics statistics() const;
 
@@ -73,7 +72,7 @@ class Observer {
     if (options_.progress)
       run_.progress = {attempt.t, attempt.h, attempt.order, move.drift_before, move.length, 0};
     if (attempt.steps == 0) check_start(attempt, move);
-    if (!attempt.repeated && FirstSteps::are_checked(attempt.steps))
+    if (!attempt.repeated && RowFaults::are_checked(attempt.steps))
       check_rows(attempt, candidate, corrected, rows);
   }
 
@@ -100,14 +99,13 @@ class Observer {
     double first_move = 0.0;   // of the last attempt at the first step, in tolerances
     int refused_starts = 0;    // attempts at it with a move that does not shrink
     double moved = std::numeric_limits<double>::infinity();  // in the last attempt; inf: it failed
-    Progress progress;                           // what the caller is told once it is accepted
-    long moved_in_row = 0, standing = 0;         // accepted steps
-    long rejections = 0, rejections_before = 0;  // attempts that IDA repeated
-    long window_begin = 0;                       // accepted steps when they were last counted
-    long refused_steps = 0, last_refused = -1;   // of these, steps with a rejection
-    bool refused = false;                        // most steps of a stretch
-    long suspected = -1;                         // the step that was diagnosed
-    std::string suspicion;                       // found then
+    Progress progress;                          // what the caller is told once it is accepted
+    long moved_in_row = 0, standing = 0;        // accepted steps
+    long window_begin = 0;                      // accepted steps when they were last counted
+    long refused_steps = 0, last_refused = -1;  // of these, steps with a rejection
+    bool refused = false;                       // most steps of a stretch
+    long suspected = -1;                        // the step that was diagnosed
+    std::string suspicion;                      // found then
   };
   struct Tally {
     double move_sum = 0.0;
@@ -122,7 +120,6 @@ class Observer {
   void count_rejections(const Attempt& attempt) {
     const bool moved = run_.moved > kPartInTest;
     if (attempt.repeated) {
-      ++run_.rejections;
       if (moved && std::exchange(run_.last_refused, attempt.steps) != attempt.steps)
         ++run_.refused_steps;
       return;
@@ -137,10 +134,11 @@ class Observer {
   void measure(const Candidate& candidate, const Move& move, RowsAt& rows);
   void check_rows(const Attempt& attempt, const Candidate& candidate, N_Vector corrected,
                   RowsAt& rows);
-  std::string cause(const Attempt& attempt, const Candidate& candidate, const std::string& doubt);
+  std::string cause(const Attempt& attempt, const Candidate& candidate);
+  std::string wrong_entry(const Candidate& candidate);
   std::string undetermined_multipliers(const Candidate& candidate, N_Vector y);
   std::string too_high_index() const;
-  std::string rounding_of_multipliers() const;
+  std::string trouble_of_multipliers() const;
   void check_start(const Attempt& attempt, const Move& move);
 
   const Options& options_;
@@ -151,7 +149,6 @@ class Observer {
   Corrector& corrector_;
   AlgebraicVariables& variables_;
   RowFaults faults_;
-  FirstSteps first_steps_;
   Run run_;
   Tally tally_;
   Bypass bypass_;

@@ -45,16 +45,19 @@ const char* to_string(Status status) {
 }
 
 int Report::finish(Status outcome, const std::string& text, long steps) {
-  status = outcome;
   if (outcome == Status::success) return succeed();
-  message = text;
   for (const Outcome& counted : outcomes)
     if (counted.status == outcome && counted.count != nullptr) ++(statistics_.*counted.count);
-  if (is_fatal(outcome))
-    print_fatal(message.c_str());
-  else
-    count_failure_in_step(text, steps);
-  return is_fatal(outcome) ? kFatal : kRecoverable;
+  if (is_fatal(outcome)) return caught(outcome, text.c_str());
+  status = outcome;
+  message = text;
+  const bool prints = prints_failures(steps);
+  failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
+  failing_step_ = steps;
+  if (prints && first_of(Status::not_converged))
+    print("step " + std::to_string(steps + 1) + " was tried " + std::to_string(failures_in_step_) +
+          " times without a point on the constraints: " + text);
+  return kRecoverable;
 }
 
 int Report::caught(Status outcome, const char* text) noexcept {
@@ -64,14 +67,10 @@ int Report::caught(Status outcome, const char* text) noexcept {
   } catch (...) {  // no memory for the text either
     message.clear();
   }
-  print_fatal(text);
+  // Once: IDA reports the failure of the run by itself.
+  if (options_.print && first_of(Status::callback_fatal))
+    std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
   return kFatal;
-}
-
-// Once: IDA reports the failure of the run by itself.
-void Report::print_fatal(const char* text) noexcept {
-  if (!options_.print || !first_of(Status::callback_fatal)) return;
-  std::fprintf(stderr, "tether: %s: %s\n", to_string(status), text);
 }
 
 bool Report::prints_failures(long steps) const {
@@ -80,19 +79,10 @@ bool Report::prints_failures(long steps) const {
   return failures >= (steps == 0 ? 2 * kSayAfter : kSayAfter);
 }
 
-void Report::count_failure_in_step(const std::string& text, long steps) {
-  const bool prints = prints_failures(steps);
-  failures_in_step_ = steps == failing_step_ ? failures_in_step_ + 1 : 1;
-  failing_step_ = steps;
-  if (prints && first_of(Status::not_converged))
-    print("step " + std::to_string(steps + 1) + " was tried " + std::to_string(failures_in_step_) +
-          " times without a point on the constraints: " + text);
-}
-
-void Report::warn(Status kind, const std::string& text, const std::string& printed) {
-  warning_ = text;
+void Report::warn(Status kind, const std::string& text) {
+  warning_ = text + (warning_.empty() ? "" : "; " + warning_);
   warning_status_ = kind;
-  if (first_of(kind)) print(printed);
+  if (first_of(kind)) print(text);
 }
 
 // Whether nothing of this kind was printed yet: not again after every IDAReInit. A bit for each

@@ -40,9 +40,9 @@ class Report {
   int caught(Status outcome, const char* text) noexcept;
   /// Whether the next failure in the step after `steps` is printed.
   bool prints_failures(long steps) const;
-  /// Keeps the reason why IDA rejects most steps or results are doubtful; prints `said` on stderr.
-  void warn(Status kind, const std::string& text, const std::string& printed);
-  void warn(Status kind, const std::string& text) { warn(kind, text, text); }
+  /// Keeps and prints the reason why IDA rejects most steps or results are doubtful. An earlier
+  /// doubt follows, without being printed again.
+  void warn(Status kind, const std::string& text);
   /// Prints on stderr if Options::print is set.
   void print(const std::string& text) const;
   /// A new run starts.
@@ -54,14 +54,11 @@ class Report {
     message = warning_;
     return kFatal;
   }
-  const std::string& warning_text() const { return warning_; }
   Status warning() const { return warning_status_; }
   Status status_or_warning() const { return status == Status::success ? warning_status_ : status; }
   const std::string& text() const { return message.empty() ? warning_ : message; }
 
  private:
-  void count_failure_in_step(const std::string& text, long steps);
-  void print_fatal(const char* text) noexcept;
   bool first_of(Status kind) noexcept;
 
   const Options& options_;

@@ -14,9 +14,11 @@ using S = Statistics;
 
 struct Entry {
   const char* name;
-  long S::*count;
+  long S::*count = nullptr;
   double S::*size = nullptr;
 
+  constexpr Entry(const char* its_name, long S::*of) : name(its_name), count(of) {}
+  constexpr Entry(const char* its_name, double S::*of) : name(its_name), size(of) {}
   double value(const S& s) const { return count ? static_cast<double>(s.*count) : s.*size; }
   void write(std::ostream& out, const S& s) const {
     if (count)
@@ -25,38 +27,18 @@ struct Entry {
       out << std::setprecision(6) << std::scientific << s.*size << std::defaultfloat;
   }
 };
-constexpr Entry kEntries[] = {{"solver_calls", &S::solver_calls},
-                              {"steps_without_plugin", &S::steps_without_plugin},
-                              {"projections", &S::projections},
-                              {"skipped", &S::skipped},
-                              {"iterations", &S::iterations},
-                              {"value_evaluations", &S::value_evaluations},
-                              {"jacobian_evaluations", &S::jacobian_evaluations},
-                              {"joint_evaluations", &S::joint_evaluations},
-                              {"factorizations", &S::factorizations},
-                              {"refactorizations", &S::refactorizations},
-                              {"extra_iterations", &S::extra_iterations},
-                              {"corrections_repeated", &S::corrections_repeated},
-                              {"refreshes", &S::refreshes},
-                              {"residual_evaluations", &S::residual_evaluations},
-                              {"rank_drops", &S::rank_drops},
-                              {"untested", &S::untested},
-                              {"smoothing_begun", &S::smoothing_begun},
-                              {"order_limited", &S::order_limited},
-                              {"sensitivity_projections", &S::sensitivity_projections},
-                              {"not_converged", &S::not_converged},
-                              {"move_too_long", &S::move_too_long},
-                              {"moves_capped", &S::moves_capped},
-                              {"inconsistent", &S::inconsistent},
-                              {"not_finite", &S::not_finite},
-                              {"callback_recoverable", &S::callback_recoverable},
-                              {"callback_fatal", &S::callback_fatal},
-                              {"corrector_failures", &S::corrector_failures},
-                              {"largest_drift_before", nullptr, &S::largest_drift_before},
-                              {"largest_drift_after", nullptr, &S::largest_drift_after},
-                              {"largest_move", nullptr, &S::largest_move},
-                              {"mean_move", nullptr, &S::mean_move},
-                              {"seconds", nullptr, &S::seconds}};
+#define TETHER_ENTRIES(of)                                                                        \
+  of(solver_calls), of(steps_without_plugin), of(projections), of(skipped), of(iterations),       \
+      of(value_evaluations), of(jacobian_evaluations), of(joint_evaluations), of(factorizations), \
+      of(refactorizations), of(extra_iterations), of(corrections_repeated), of(refreshes),        \
+      of(residual_evaluations), of(rank_drops), of(untested), of(smoothing_begun),                \
+      of(order_limited), of(sensitivity_projections), of(not_converged), of(move_too_long),       \
+      of(moves_capped), of(inconsistent), of(not_finite), of(callback_recoverable),               \
+      of(callback_fatal), of(corrector_failures), of(largest_drift_before),                       \
+      of(largest_drift_after), of(largest_move), of(mean_move), of(seconds)
+#define TETHER_ENTRY(name) \
+  { #name, &S::name }
+constexpr Entry kEntries[] = {TETHER_ENTRIES(TETHER_ENTRY)};
 
 // The numbers together, in one line. A mean move of a tolerance is as long as an error
 // that IDA's test accepts: constraints that F keeps need less.
