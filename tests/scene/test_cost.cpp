@@ -6,7 +6,7 @@
 #include <tether/scene/cost.hpp>
 #include <tether/scene/files.hpp>
 
-#include "cost/reference.hpp"
+#include "cost/with_setting.hpp"
 #include "support/catch.hpp"
 
 using namespace tether::scene;

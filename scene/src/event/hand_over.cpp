@@ -50,7 +50,24 @@ class EventsThenSteps final : public Engine {
 
   const char* name() const override { return "event"; }
   double time() const override { return now().time(); }
-  void advance(double t) override;
+  void advance(double t) override {
+    const double slack = kSameFigure * step_;
+    while (true) {
+      if (!steps_) try {
+          events_->advance(t);
+          return append_events();
+        } catch (const SimulationError& e) {
+          take_over(e.what());
+        }
+      while (steps_ && time() < t - slack) {
+        const double before = time();
+        steps_->advance(before + 0.5 * step_);
+        if (!(time() > before)) return;  // interrupted
+        give_back_if_settled();
+      }
+      if (steps_ || time() >= t) return;
+    }
+  }
 
   const std::vector<BodyState>& bodies() const override { return now().bodies(); }
   Diagnostics diagnostics() const override { return now().diagnostics(); }
@@ -73,8 +90,42 @@ class EventsThenSteps final : public Engine {
     return steps_ ? hand_overs_.back().before : events_->counts();
   }
 
-  void save(std::ostream& out) const override;
-  void restore(std::istream& in, Restore how) override;
+  void save(std::ostream& out) const override {
+    if (hand_overs_.empty()) return events_->save(out);
+    write_bodies(out, time(), bodies(), kHandedOver);
+    binary::Archive io(out);
+    exchange_hand_overs(*this, io);
+    now().save(out);
+  }
+  void restore(std::istream& in, Restore how) override {
+    const std::string all{std::istreambuf_iterator<char>(in), {}};
+    std::istringstream content(all);
+    binary::Archive io(content);
+    skip_bodies(content, scene_.bodies.size(), event::kNoState);
+    all_events_.clear();
+    hand_overs_.clear();
+    closed_.clear();
+    steps_.reset();
+    steps_before_ = Counts();
+    begin_events(event::Begin::later);
+    if (!binary::begins(content, kHandedOver)) {
+      content = std::istringstream(all);
+      events_->restore(content, how);
+    } else {
+      exchange_hand_overs(*this, io);
+      io.demand(are_in_order());
+      if (hand_overs_.back().back) {
+        events_->restore(content, how);
+      } else {
+        begin_steps();
+        steps_->restore(content, how);
+      }
+      io.demand(hand_overs_.back().back.value_or(hand_overs_.back().time) <=
+                time() + step_);  // a boundary may lie shortly before
+    }
+    if (content.peek() != std::char_traits<char>::eof())
+      throw std::runtime_error("the saved state is longer than this scene needs");
+  }
 
  private:
   const Engine& now() const {
@@ -114,13 +165,92 @@ class EventsThenSteps final : public Engine {
     unchanged_steps_ = 0;
     closed_.clear();
   }
-  void take_over(const std::string& why);
-  void give_back_if_settled();
-  void give_back();
-  bool may_give_back() const;
+  void require_twice() {
+    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
+  }
+  void take_over(const std::string& why) {
+    append_events();
+    const double since = hand_overs_.empty() ? 0 : *hand_overs_.back().back;
+    const double required_time = static_cast<double>(required_steps_) * step_;
+    if (events_->time() - since >= required_time)
+      required_steps_ = kUnchangedSteps;
+    else if (!hand_overs_.empty())
+      require_twice();
+    begin_steps();
+    append_hand_over({events_->time(), why, events_->counts(), {}, 0}, energy_of(*events_));
+    steps_->begin_at(events_->time(), events_->bodies());
+  }
+  void give_back_if_settled() {
+    if (!may_give_back()) return;
+    std::optional<std::vector<int>> closed = events_->closed_in({time(), bodies(), step_});
+    unchanged_steps_ =
+        closed && (unchanged_steps_ == 0 || *closed == closed_) ? unchanged_steps_ + 1 : 0;
+    if (closed) closed_ = std::move(*closed);
+    if (unchanged_steps_ < required_steps_) return;
+    try {
+      give_back();
+    } catch (const SimulationError&) {
+      require_twice();
+    } catch (const std::invalid_argument&) {
+      require_twice();
+    }
+  }
+  void give_back() {
+    HandOver& last = hand_overs_.back();
+    events_->resume({time(), bodies(), step_}, last.before);
+    from_events_ = 0;
+    double lost = energy_ - energy_of(*events_);
+    for (const ContactEvent& each : events_->events()) lost -= each.lost;
+    last.back = time();
+    last.lost = lost;
+    ContactEvent event;
+    event.time = time();
+    event.kind = ContactEvent::Kind::resume;
+    event.lost = lost;
+    all_events_.push_back(event);
+    steps_before_ += counts_of_steps();
+    steps_.reset();
+    append_events();
+  }
+  // Returns false if the event engine has used up its limits of events or steps.
+  bool may_give_back() const {
+    const EventOptions& options = *scene_.event;
+    const Counts& before = hand_overs_.back().before;
+    return before.events <= options.max_events && before.steps <= options.max_steps &&
+           hand_overs_.size() < kMostHandOvers;
+  }
   template <class Self>
-  static void exchange_hand_overs(Self& self, binary::Archive& io);
-  bool are_in_order() const;
+  static void exchange_hand_overs(Self& self, binary::Archive& io) {
+    io.list(self.hand_overs_, [&](auto& each) {
+      Counts before = each.before;
+      before.each([&](long& n) { io(n); });
+      double back = each.back.value_or(-1);
+      io(each.time, back, each.lost, each.why);
+      io.demand(std::isfinite(each.time) && std::isfinite(back) && std::isfinite(each.lost));
+      if constexpr (!std::is_const_v<Self>) {
+        each.before = before;
+        if (back >= 0) each.back = back;
+      }
+    });
+    io(self.energy_, self.unchanged_steps_, self.required_steps_);
+    io.demand(std::isfinite(self.energy_) && self.unchanged_steps_ >= 0 &&
+              self.unchanged_steps_ <= std::int64_t{binary::kMostCounted} &&
+              self.required_steps_ >= kUnchangedSteps &&
+              self.required_steps_ <= std::int64_t{binary::kMostCounted});
+    io.list(self.closed_, [&](auto& contact) { io(contact); });
+  }
+  // Each begins where the one before has ended, or later.
+  bool are_in_order() const {
+    bool good = !hand_overs_.empty() && hand_overs_.size() <= kMostHandOvers;
+    std::optional<double> since = 0;
+    for (const HandOver& each : hand_overs_) {
+      Counts before = each.before;
+      before.each([&](long n) { good = good && n >= 0 && n <= binary::kMostCounted; });
+      good = good && since && each.time >= *since && each.back.value_or(each.time) >= each.time;
+      since = each.back;
+    }
+    return good;
+  }
 
   double step_;
   Scene scene_, steps_scene_;
@@ -135,152 +265,6 @@ class EventsThenSteps final : public Engine {
   std::int64_t unchanged_steps_ = 0, required_steps_ = kUnchangedSteps;
   std::vector<int> closed_;  // contacts, for `unchanged_steps_` steps
 };
-
-void EventsThenSteps::advance(double t) {
-  const double slack = kSameFigure * step_;
-  while (true) {
-    if (!steps_) try {
-        events_->advance(t);
-        return append_events();
-      } catch (const SimulationError& e) {
-        take_over(e.what());
-      }
-    while (steps_ && time() < t - slack) {
-      const double before = time();
-      steps_->advance(before + 0.5 * step_);
-      if (!(time() > before)) return;  // interrupted
-      give_back_if_settled();
-    }
-    if (steps_ || time() >= t) return;
-  }
-}
-
-void EventsThenSteps::take_over(const std::string& why) {
-  append_events();
-  const double since = hand_overs_.empty() ? 0 : *hand_overs_.back().back;
-  const double required_time = static_cast<double>(required_steps_) * step_;
-  if (events_->time() - since >= required_time)
-    required_steps_ = kUnchangedSteps;
-  else if (!hand_overs_.empty())
-    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
-  begin_steps();
-  append_hand_over({events_->time(), why, events_->counts(), {}, 0}, energy_of(*events_));
-  steps_->begin_at(events_->time(), events_->bodies());
-}
-
-// Returns false if the event engine has used up its limits of events or steps.
-bool EventsThenSteps::may_give_back() const {
-  const EventOptions& options = *scene_.event;
-  const Counts& before = hand_overs_.back().before;
-  return before.events <= options.max_events && before.steps <= options.max_steps &&
-         hand_overs_.size() < kMostHandOvers;
-}
-
-void EventsThenSteps::give_back_if_settled() {
-  if (!may_give_back()) return;
-  std::optional<std::vector<int>> closed = events_->closed_in({time(), bodies(), step_});
-  unchanged_steps_ =
-      closed && (unchanged_steps_ == 0 || *closed == closed_) ? unchanged_steps_ + 1 : 0;
-  if (closed) closed_ = std::move(*closed);
-  if (unchanged_steps_ < required_steps_) return;
-  try {
-    give_back();
-  } catch (const SimulationError&) {
-    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
-  } catch (const std::invalid_argument&) {
-    required_steps_ = std::min(2 * required_steps_, std::int64_t{binary::kMostCounted});
-  }
-}
-
-void EventsThenSteps::give_back() {
-  HandOver& last = hand_overs_.back();
-  events_->resume({time(), bodies(), step_}, last.before);
-  from_events_ = 0;
-  double lost = energy_ - energy_of(*events_);
-  for (const ContactEvent& each : events_->events()) lost -= each.lost;
-  last.back = time();
-  last.lost = lost;
-  ContactEvent event;
-  event.time = time();
-  event.kind = ContactEvent::Kind::resume;
-  event.lost = lost;
-  all_events_.push_back(event);
-  steps_before_ += counts_of_steps();
-  steps_.reset();
-  append_events();
-}
-
-template <class Self>
-void EventsThenSteps::exchange_hand_overs(Self& self, binary::Archive& io) {
-  io.list(self.hand_overs_, [&](auto& each) {
-    Counts before = each.before;
-    before.each([&](long& n) { io(n); });
-    double back = each.back.value_or(-1);
-    io(each.time, back, each.lost, each.why);
-    io.demand(std::isfinite(each.time) && std::isfinite(back) && std::isfinite(each.lost));
-    if constexpr (!std::is_const_v<Self>) {
-      each.before = before;
-      if (back >= 0) each.back = back;
-    }
-  });
-  io(self.energy_, self.unchanged_steps_, self.required_steps_);
-  io.demand(std::isfinite(self.energy_) && self.unchanged_steps_ >= 0 &&
-            self.unchanged_steps_ <= std::int64_t{binary::kMostCounted} &&
-            self.required_steps_ >= kUnchangedSteps &&
-            self.required_steps_ <= std::int64_t{binary::kMostCounted});
-  io.list(self.closed_, [&](auto& contact) { io(contact); });
-}
-
-void EventsThenSteps::save(std::ostream& out) const {
-  if (hand_overs_.empty()) return events_->save(out);
-  write_bodies(out, time(), bodies(), kHandedOver);
-  binary::Archive io(out);
-  exchange_hand_overs(*this, io);
-  now().save(out);
-}
-
-// Each begins where the one before has ended, or later.
-bool EventsThenSteps::are_in_order() const {
-  bool good = !hand_overs_.empty() && hand_overs_.size() <= kMostHandOvers;
-  std::optional<double> since = 0;
-  for (const HandOver& each : hand_overs_) {
-    Counts before = each.before;
-    before.each([&](long n) { good = good && n >= 0 && n <= binary::kMostCounted; });
-    good = good && since && each.time >= *since && each.back.value_or(each.time) >= each.time;
-    since = each.back;
-  }
-  return good;
-}
-
-void EventsThenSteps::restore(std::istream& in, Restore how) {
-  const std::string all{std::istreambuf_iterator<char>(in), {}};
-  std::istringstream content(all);
-  binary::Archive io(content);
-  skip_bodies(content, scene_.bodies.size(), event::kNoState);
-  all_events_.clear();
-  hand_overs_.clear();
-  closed_.clear();
-  steps_.reset();
-  steps_before_ = Counts();
-  begin_events(event::Begin::later);
-  if (!binary::begins(content, kHandedOver)) {
-    content = std::istringstream(all);
-    events_->restore(content, how);
-  } else {
-    exchange_hand_overs(*this, io);
-    io.demand(are_in_order());
-    if (hand_overs_.back().back) {
-      events_->restore(content, how);
-    } else {
-      begin_steps();
-      steps_->restore(content, how);
-    }
-    io.demand(hand_overs_.back().back.value_or(hand_overs_.back().time) <=
-              time() + step_);  // a boundary may lie shortly before
-  }
-  if (content.peek() != std::char_traits<char>::eof())
-    throw std::runtime_error("the saved state is longer than this scene needs");
-}
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Tether: reads scene files. SPDX-License-Identifier: BSD-3-Clause
+// Tether: reads and writes scene files. SPDX-License-Identifier: BSD-3-Clause
 #include "read.hpp"
 
 #include <fstream>
@@ -11,6 +11,48 @@
 namespace tether::scene::files {
 
 namespace {
+
+constexpr int kMostCounted = 2000000000;
+
+void each_field(SmoothOptions& o, const Form& io) {
+  io.number("tolerance", o.tolerance, {1e-14, 1e-1, "a number from 1e-14 to 0.1"},
+            "relative, and absolute in SI");
+  io.word("formulation", o.formulation);
+  io.flag("projection", o.projection);
+  io.number("max_step", o.max_step, kNotNegative, "s; 0: free");
+  io.count("max_steps", o.max_steps, 1, kMostCounted);
+}
+
+void each_field(EventOptions& o, const Form& io) {
+  io.number("tolerance", o.tolerance, {1e-13, 1e-1, "a number from 1e-13 to 0.1"},
+            "relative, and absolute in SI");
+  io.number("max_step", o.max_step, kNotNegative, "s; 0: free");
+  io.count("max_events", o.max_events, 1, kMostCounted);
+  io.count("max_steps", o.max_steps, 1, kMostCounted);
+  io.word("otherwise", o.otherwise);
+}
+
+void each_field(SteppingOptions& o, const Form& io) {
+  constexpr const char* kOfSpeed = "of sqrt(gravity * size)";
+  io.number("step", o.step, kPositive, "s");
+  io.number("accuracy", o.accuracy, {0, 0.1, "a number from 0 to 0.1"},
+            "of the size of each body; 0: none, steps are taken whole");
+  io.word("law", o.law);
+  io.number("tolerance", o.tolerance, kPositivePart, "relative residual");
+  io.word("gyroscopic", o.gyroscopic);
+  io.number("error_reduction", o.error_reduction, kPart, "");
+  io.number("max_depenetration_speed", o.max_depenetration_speed, kNotNegative, "m/s");
+  io.word("restitution_law", o.restitution_law);
+  io.number("restitution_threshold", o.restitution_threshold, kNotNegative, kOfSpeed);
+  io.number("impact_threshold", o.impact_threshold, kNotNegative, kOfSpeed);
+  io.flag("cut_at_impacts", o.cut_at_impacts);
+  io.number("sleep", o.sleep, kNotNegative, "of sqrt(gravity * size); 0: none sleeps");
+  io.number("acceptance", o.acceptance, {1, 1e12, "a number from 1 to 1e12"}, "of the tolerance");
+  io.count("max_halvings", o.max_halvings, 0, 30);
+  io.count("max_sweeps", o.max_sweeps, 1, 1000000000);
+  io.word("on_failure", o.on_failure);
+  io.count("threads", o.threads, 1, 256);
+}
 
 void check_bodies(const Scene& scene, Report& report) {
   if (scene.bodies.empty())
@@ -109,8 +151,6 @@ void expected_value(const Form& form, Expect& e) {
     in->missing("value", "give value and within, at_most or at_least");
 }
 
-}  // namespace
-
 void scene_fields(const Form& form, Scene& scene) {
   if (form.in()) scene.name = form.in()->text("name", "");
   if (form.out()) form.out()->field("name", scene.name);
@@ -160,11 +200,14 @@ void expect_fields(const Form& root, Scene& scene) {
   });
 }
 
+/// Checks across fields: names, pairs of materials, bodies that cannot move, times.
 void check(const Scene& scene, Report& report) {
   check_bodies(scene, report);
   for (const effects::Effect* each : effects::all()) each->check(scene, report);
   check_times(scene, report);
 }
+
+}  // namespace
 
 Scene read(Value document, const std::string& name) {
   repeat_elements(document, name);
@@ -226,6 +269,31 @@ Scene read_scene(const std::string& path) {
   const std::string text = files::read_stream(in, kLargestScene);
   if (in.bad()) files::refuse({path, 0, 0}, "cannot be read");
   return parse_scene(text, path);
+}
+
+std::string write_scene(const Scene& of) {
+  Scene scene = of;  // forms change what they read
+  files::Writer out;
+  const files::Form form(out, of);
+  const auto options = [&](const char* key, auto& values) {
+    if (!values) return;
+    out.table(key);
+    files::each_field(*values, form);
+  };
+  out.table("scene");
+  files::scene_fields(form, scene);
+  options("smooth", scene.smooth);
+  options("stepping", scene.stepping);
+  options("event", scene.event);
+  out.table("output");
+  files::output_fields(form, scene.output);
+  for (Body& body : scene.bodies) {
+    out.item("body");
+    files::body_fields(form, body);
+  }
+  files::list_fields(form, scene);
+  files::expect_fields(form, scene);
+  return out.take().substr(1);
 }
 
 }  // namespace tether::scene

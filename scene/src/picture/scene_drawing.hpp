@@ -10,10 +10,6 @@ namespace tether::scene::picture {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-struct Pose {
-  Vector3d position;
-  Eigen::Quaterniond orientation;
-};
 /// Poses of the first bodies of a scene.
 using Poses = std::vector<Pose>;
 

@@ -14,6 +14,95 @@ using binary::Archive;
 using contact::StepperMemory;
 using Eigen::Vector3d;
 
+/// Sums what those steps change of the energy in which nothing strikes or slips, where nothing but
+/// weight and what holds bodies acts on them. It is an error: contacts that hold do no work.
+class EnergyError {
+ public:
+  /// dt: length of a step, s. `joined`: by body, whether joints hold it.
+  EnergyError(const Eigen::Vector3d& gravity, double dt, std::vector<char> joined,
+              const contact::BodySet& bodies)
+      : gravity_(gravity), dt_(dt), joined_(std::move(joined)) {
+    begin_at(bodies);
+  }
+
+  /// Goes on from other states.
+  void begin_at(const contact::BodySet& bodies) {
+    last_.clear();
+    energy_ = energy(bodies);
+    power_ = power(bodies);
+  }
+  /// After each step.
+  // Contacts hold by the velocity at the end of a step, which moves a body, too: the work of its
+  // weight is the mean of two steps, as it is along the parabola of a free body. Corrections of
+  // positions are no motion.
+  void add(const contact::BodySet& bodies, const contact::StepContacts& contacts) {
+    const bool steady = note(contacts);
+    const double last = std::exchange(energy_, energy(bodies));
+    const double pulled = std::exchange(power_, power(bodies));
+    if (steady) sum_ += energy_ - last - 0.5 * dt_ * (pulled + power_);
+  }
+  /// J.
+  double sum() const { return sum_; }
+
+ private:
+  // A normal impulse that changes by more from step to step is one of an impact, or of a force that
+  // the steps do not resolve.
+  static constexpr double kSteady = 2;
+
+  // The normal impulse of the step before; 0: none. Contacts mostly keep their order.
+  double before(std::uint64_t id) {
+    for (std::size_t k = 0; k < last_.size(); ++k, ++next_) {
+      if (next_ >= last_.size()) next_ = 0;
+      if (last_[next_].first == id) return last_[next_++].second;
+    }
+    return 0;
+  }
+  // Keeps the impulses of the step; whether the same contacts as before hold.
+  bool note(const contact::StepContacts& contacts) {
+    bool steady = true;
+    next_ = 0;
+    now_.clear();
+    for (std::size_t k = 0; k < contacts.impulses.size(); ++k) {
+      const contact::PointContact& c = contacts.points[k];
+      const double normal = c.normal.dot(contacts.impulses[k]);
+      if (!(normal > 0)) continue;
+      const double friction = (contacts.impulses[k] - normal * c.normal).norm(),
+                   last = before(c.id);
+      // A contact with more of its largest friction may slip in a part of the step.
+      steady = steady && normal <= kSteady * last && last <= kSteady * normal &&
+               (friction == 0 || friction < 0.99 * c.mu * normal);
+      now_.emplace_back(c.id, normal);
+    }
+    steady = steady && now_.size() == last_.size();
+    std::swap(last_, now_);
+    return steady;
+  }
+  // Kinetic, and potential of bodies that joints hold. Their velocity at the end of a step is that
+  // of its middle, and so is the place.
+  double energy(const contact::BodySet& bodies) const {
+    double sum = contact::kinetic_energy(bodies);
+    for (std::size_t i = 0; i < joined_.size(); ++i)
+      if (joined_[i] != 0)
+        sum -= bodies.mass[i] *
+               gravity_.dot(bodies.position[i] - 0.5 * dt_ * bodies.motion[i].velocity);
+    return sum;
+  }
+  // The power of the weight of all others, W.
+  double power(const contact::BodySet& bodies) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < joined_.size(); ++i)
+      if (joined_[i] == 0) sum += bodies.mass[i] * gravity_.dot(bodies.motion[i].velocity);
+    return sum;
+  }
+
+  Eigen::Vector3d gravity_;
+  double dt_;
+  std::vector<char> joined_;
+  double energy_ = 0, power_ = 0, sum_ = 0;                   // after the last step
+  std::vector<std::pair<std::uint64_t, double>> last_, now_;  // contacts and normal impulses
+  std::size_t next_ = 0;                                      // of `last_`: where before() begins
+};
+
 namespace {
 
 void refuse(const Scene& scene) {
@@ -72,11 +161,6 @@ void exchange(Archive& io, int bodies, StepperMemory::Sleep& sleep) {
   });
 }
 
-contact::Stepper make_stepper(Mapped mapped) {
-  return contact::Stepper(std::move(mapped.bodies), std::move(mapped.surfaces),
-                          std::move(mapped.meetings), mapped.options);
-}
-
 /// Throws std::runtime_error on a memory that no stepper of so many bodies has written.
 void exchange(Archive& io, int bodies, StepperMemory& m) {
   const auto demand_not_negative = [&](std::initializer_list<double> numbers, const char* why) {
@@ -128,25 +212,20 @@ Vector3d velocity(const contact::BodySet& bodies, int body, const Vector3d& r) {
 // The last letter is the format.
 constexpr binary::Magic kMagic = {'T', 'E', 'T', 'H', 'S', 'T', 'P', '9'};
 
-Mapped mapped_for(contact::SolverTeam* team, const Scene& scene) {
-  Mapped out = map_scene(scene);
-  out.options.team = team;
-  return out;
-}
-
-}  // namespace
-
-Mapped map_scene(const Scene& scene) {
+/// Throws std::invalid_argument, naming what the scene asks for and stepping does not have.
+contact::Stepper make_stepper(const Scene& scene, contact::SolverTeam* team) {
   refuse(scene);
-  Mapped out;
+  contact::BodySet bodies;
+  std::vector<contact::Surface> surfaces;
+  std::vector<contact::Meeting> meetings;
   const std::map<std::string, int> material = materials(scene);
   for (const Body& body : scene.bodies) {
     const std::string where = "body \"" + body.name + "\": ";
     int index = 0;
     try {
-      index = body.fixed ? out.bodies.add_fixed(body.position, body.orientation)
-                         : out.bodies.add(body.mass, body.inertia, body.position, body.orientation,
-                                          body.velocity, body.angular_velocity);
+      index = body.fixed ? bodies.add_fixed(body.position, body.orientation)
+                         : bodies.add(body.mass, body.inertia, body.position, body.orientation,
+                                      body.velocity, body.angular_velocity);
     } catch (const std::invalid_argument& problem) {
       throw std::invalid_argument(where + problem.what());
     }
@@ -154,8 +233,8 @@ Mapped map_scene(const Scene& scene) {
     if (found == material.end()) continue;
     const SurfaceSpeed speed = body.surface.value_or(SurfaceSpeed{});
     for (const Shape& shape : body.shapes)
-      out.surfaces.push_back({index, shape, found->second, speed.velocity, speed.angular_velocity,
-                              body.friction_axis.value_or(Vector3d::Zero())});
+      surfaces.push_back({index, shape, found->second, speed.velocity, speed.angular_velocity,
+                          body.friction_axis.value_or(Vector3d::Zero())});
   }
   for (const Pair& pair : scene.pairs) {
     if (!pair.touch) continue;
@@ -163,24 +242,24 @@ Mapped map_scene(const Scene& scene) {
     meeting.first = material.at(pair.first);
     meeting.second = material.at(pair.second);
     for (const effects::Effect* each : effects::all()) each->configure_pair(pair, meeting);
-    out.meetings.push_back(meeting);
+    meetings.push_back(meeting);
   }
 
-  out.options = scene.stepping.value_or(SteppingOptions{});
-  out.options.gravity.reset();
-  out.options.simultaneous_impacts = scene.simultaneous_impacts;
-  for (const effects::Effect* each : effects::all()) each->configure(scene, out.options);
-  return out;
+  contact::SteppingOptions options = scene.stepping.value_or(SteppingOptions{});
+  options.gravity.reset();
+  options.simultaneous_impacts = scene.simultaneous_impacts;
+  for (const effects::Effect* each : effects::all()) each->configure(scene, options);
+  options.team = team;
+  return contact::Stepper(std::move(bodies), std::move(surfaces), std::move(meetings), options);
 }
 
-SteppingEngine::SteppingEngine(const Scene& scene, contact::SolverTeam* team)
-    : SteppingEngine(scene, mapped_for(team, scene)) {}
+}  // namespace
 
-SteppingEngine::SteppingEngine(const Scene& scene, Mapped mapped)
-    : stepped_(scene),
+SteppingEngine::SteppingEngine(const Scene& scene, contact::SolverTeam* team)
+    : stepper_(make_stepper(scene, team)),
+      stepped_(scene),
       forces_(effects::make_forces(scene, stepped_.bodies())),
       on_failure_(scene.stepping.value_or(SteppingOptions{}).on_failure),
-      stepper_(make_stepper(std::move(mapped))),
       fingerprint_(fingerprint(scene, stepper_.options().step)),
       bodies_(scene.bodies.size()) {
   if (!scene.joints.empty() || effects::has_joint_laws(scene)) {
@@ -257,8 +336,9 @@ void SteppingEngine::watch_energy(const Scene& scene) {
   for (const Joint& joint : scene.joints)
     for (const int body : {joint.first, joint.second})
       if (body >= 0) joined[static_cast<std::size_t>(body)] = 1;
-  energy_error_.emplace(scene.gravity.value_or(Vector3d::Zero()), stepper_.options().step,
-                        std::move(joined), stepper_.bodies());
+  energy_error_ =
+      std::make_unique<EnergyError>(scene.gravity.value_or(Vector3d::Zero()),
+                                    stepper_.options().step, std::move(joined), stepper_.bodies());
 }
 
 void SteppingEngine::report_failure() const {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "effects/list.hpp"
-#include "energy_error.hpp"
 #include "joints/coordinate.hpp"
 #include "joints/joint_rows.hpp"
 #include "mechanics/force.hpp"
@@ -54,16 +53,7 @@ class SteppedJoints final : public contact::JointEquations {
   std::vector<Gradient> gradients_;  // by row
 };
 
-struct Mapped {
-  contact::BodySet bodies;
-  std::vector<contact::Surface> surfaces;
-  std::vector<contact::Meeting> meetings;
-  contact::SteppingOptions options;
-};
-
-/// Throws std::invalid_argument, naming what the scene asks for and stepping does not have.
-Mapped map_scene(const Scene& scene);
-
+class EnergyError;
 class StepScribe;
 
 class SteppingEngine final : public Engine {
@@ -88,7 +78,6 @@ class SteppingEngine final : public Engine {
   void restore(std::istream& in, Restore how) override;
 
  private:
-  SteppingEngine(const Scene& scene, Mapped mapped);
   void step();
   void watch_energy(const Scene& scene);
   void take_step();
@@ -100,18 +89,18 @@ class SteppingEngine final : public Engine {
   void add_forces(const Scene& scene);
   Eigen::Vector3d surface_velocity(int body, const Eigen::Vector3d& r) const;
 
+  contact::Stepper stepper_;
   mutable mechanics::SteppedBodies stepped_;  // the view of the forces
   std::vector<std::unique_ptr<mechanics::Force>> forces_;
   OnFailure on_failure_;
   SteppedJoints* joints_ = nullptr;  // the stepper's
-  contact::Stepper stepper_;
-  std::uint64_t fingerprint_;  // of the scene, in saved states
+  std::uint64_t fingerprint_;        // of the scene, in saved states
   std::vector<BodyState> bodies_;
   std::vector<SurfaceSpeed> surface_;  // by body; empty: none moves on its body
   mutable std::vector<ContactState> contacts_;
-  mutable long contacts_of_ = -1;            // step that contacts_ belongs to
-  std::unique_ptr<StepScribe> scribe_;       // only with Scene::certificate
-  std::optional<EnergyError> energy_error_;  // only where nothing else changes it
+  mutable long contacts_of_ = -1;              // step that contacts_ belongs to
+  std::unique_ptr<StepScribe> scribe_;         // only with Scene::certificate
+  std::unique_ptr<EnergyError> energy_error_;  // only where nothing else changes it
 };
 
 }  // namespace tether::scene::stepping

@@ -6,6 +6,7 @@
 //
 // which is M (u+ - u) = G' x, the law of a plastic impact. Where no row moves (g_t = 0) it takes
 // the energy (u+ - u)' M (u+ - u) / 2 (Carnot).
+#include <tether/linalg/disjoint_sets.hpp>
 #include <tether/linalg/least_squares.hpp>
 
 #include "bounds.hpp"
@@ -30,31 +31,19 @@ Placed place(const Scene& scene, const std::vector<BodyState>& states) {
   return out;
 }
 
-/// The joints that moving bodies connect to these, themselves included.
+/// The joints that moving bodies and couplings connect to these, themselves included.
 std::vector<bool> connected(const Scene& scene, const std::vector<int>& joints) {
-  std::vector<bool> joint_is(scene.joints.size()), body_is(scene.bodies.size());
-  for (const int j : joints) joint_is[at(j)] = true;
-  for (bool grows = true; grows;) {
-    grows = false;
-    for (std::size_t j = 0; j < scene.joints.size(); ++j) {
-      const Joint& joint = scene.joints[j];
-      const auto reached = [&](int body) { return scene.moves(body) && body_is[at(body)]; };
-      if (!joint_is[j] && !reached(joint.first) && !reached(joint.second)) continue;
-      joint_is[j] = true;
-      for (const int body : {joint.first, joint.second}) {
-        if (!scene.moves(body) || body_is[at(body)]) continue;
-        body_is[at(body)] = grows = true;
-      }
-    }
-    for (const Coupling& each : scene.couplings) {
-      if (!any_of(each.joints, [&](int j) { return joint_is[at(j)]; })) continue;
-      for (const int j : each.joints) {
-        grows = grows || !joint_is[at(j)];
-        joint_is[at(j)] = true;
-      }
-    }
-  }
-  return joint_is;
+  const int count = static_cast<int>(scene.joints.size());
+  linalg::DisjointSets sets(count + static_cast<int>(scene.bodies.size()));  // joints, then bodies
+  for (int j = 0; j < count; ++j)
+    for (const int body : {scene.joints[at(j)].first, scene.joints[at(j)].second})
+      if (scene.moves(body)) sets.join(j, count + body);
+  for (const Coupling& each : scene.couplings)
+    for (const int j : each.joints) sets.join(j, each.joints.front());
+  std::vector<bool> out;
+  for (int j = 0; j < count; ++j)
+    out.push_back(any_of(joints, [&](int each) { return sets.root(each) == sets.root(j); }));
+  return out;
 }
 
 /// The rows in terms of the velocities of the bodies that they act on.

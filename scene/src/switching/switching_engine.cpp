@@ -57,34 +57,249 @@ class SwitchingEngine final : public Engine {
 
   const char* name() const override { return engine_->name(); }
   double time() const override { return engine_->time(); }
-  void advance(double t) override;
+  // An engine that has stopped early for no interruption is where a joint breaks; one of steps is
+  // at the end of the step.
+  void advance(double t) override {
+    for (;;) {
+      const double target = std::min(t, next_switch());
+      if (time() < target) engine_->advance(target);
+      append_events();
+      if (interrupted()) return;
+      if (breaks_ && (!is_due(target) || excess(engine_->forces()) > 0))
+        snap();
+      else if (is_due(next_switch()))
+        switch_joints();
+      else
+        return;
+    }
+  }
   const std::vector<BodyState>& bodies() const override { return engine_->bodies(); }
   Diagnostics diagnostics() const override { return engine_->diagnostics(); }
   const std::vector<ContactState>& contacts() const override { return engine_->contacts(); }
-  Forces forces() const override;
+  // Joints that do not hold are where the first body has them.
+  Forces forces() const override {
+    Forces out = engine_->forces();
+    std::vector<JointForce> all(scene_.joints.size());
+    for (std::size_t j = 0; j < all.size(); ++j) {
+      const Joint& joint = scene_.joints[j];
+      all[j].at = joint.at;
+      if (joint.first < 0) continue;
+      const Body& start = scene_.bodies[at(joint.first)];
+      const BodyState& now = bodies()[at(joint.first)];
+      all[j].at = now.position + now.orientation * (start.orientation.normalized().conjugate() *
+                                                    (joint.at - start.position));
+    }
+    for (std::size_t k = 0; k < joint_of_.size(); ++k) all[at(joint_of_[k])] = out.joints[k];
+    out.joints = std::move(all);
+    return out;
+  }
   const std::vector<ContactEvent>& events() const override { return events_; }
-  Counts counts() const override;
-  std::vector<EffectCost> costs() const override;
-  void save(std::ostream& out) const override;
-  void restore(std::istream& in, Restore how) override;
+  Counts counts() const override {
+    Counts out = before_, start = start_;
+    out += engine_->counts();
+    start.each([](long& n) { n = -n; });
+    out += start;
+    return out;
+  }
+  std::vector<EffectCost> costs() const override {
+    std::vector<EffectCost> out = engine_->costs();
+    for (const EffectCost& before : costs_before_) {
+      const auto same = std::find_if(out.begin(), out.end(), [&](const EffectCost& each) {
+        return each.effect == before.effect;
+      });
+      if (same == out.end())
+        out.push_back(before);
+      else
+        same->seconds += before.seconds;
+    }
+    return out;
+  }
+  void save(std::ostream& out) const override {
+    write_bodies(out, time(), bodies(), kSwitched);
+    binary::Archive io(out);
+    exchange(*this, io);
+    engine_->save(out);
+  }
+  void restore(std::istream& in, Restore how) override {
+    const char* const no_such_state = "this is no state of joints that attach, detach or break";
+    skip_bodies(in, scene_.bodies.size(), no_such_state);
+    if (!binary::begins(in, kSwitched)) throw std::runtime_error(no_such_state);
+    binary::Archive io(in);
+    exchange(*this, io);
+    events_.clear();
+    engine_.reset();
+    before_ = Counts();
+    costs_before_.clear();
+    try {
+      begin(holding());
+    } catch (const SimulationError& e) {
+      throw std::runtime_error(std::string("the saved state is damaged: ") + e.what());
+    }
+    events_.clear();
+    engine_->restore(in, how);
+    start_ = Counts();
+  }
 
  private:
-  Scene holding() const;
-  void begin(const Scene& now);
-  void append_events();
-  double next_switch() const;
-  bool is_due(double time) const;
-  void switch_joints();
-  void snap();
-  std::size_t change(const std::vector<int>& joints, Kind kind, double lost);
+  // The scene of the joints that hold, from scene_.start on.
+  Scene holding() const {
+    Scene now = scene_;
+    now.joints.clear();
+    std::vector<int> place(scene_.joints.size(), -1);
+    for (std::size_t j = 0; j < scene_.joints.size(); ++j) {
+      if (status_[j] != Status::holding) continue;
+      place[j] = static_cast<int>(now.joints.size());
+      now.joints.push_back(scene_.joints[j]);
+      now.joints.back().window.reset();
+    }
+    for (Coupling& each : now.couplings)
+      for (int& joint : each.joints) joint = place[at(joint)];
+    return now;
+  }
+  void begin(const Scene& now) {
+    if (engine_) {
+      before_ = counts();
+      costs_before_ = costs();
+    }
+    joint_of_.clear();
+    breaks_ = false;
+    for (std::size_t j = 0; j < scene_.joints.size(); ++j) {
+      if (status_[j] != Status::holding) continue;
+      joint_of_.push_back(static_cast<int>(j));
+      breaks_ = breaks_ || (scene_.joints[j].window && scene_.joints[j].window->breaks());
+    }
+    try {
+      engine_ = make_(now);
+    } catch (const std::invalid_argument& e) {
+      if (!scene_.start) throw;
+      throw SimulationError(fmt::format(
+          "t = {:g} s: the motion cannot go on where joints attach, detach or break: {}",
+          scene_.start->time, e.what()));
+    }
+    start_ = engine_->counts();
+    from_engine_ = 0;
+    engine_->stop_when([this] { return interrupted(); });
+    if (breaks_) engine_->stop_above([this](const Forces& forces) { return excess(forces); });
+    append_events();
+  }
+  void append_events() {
+    const std::vector<ContactEvent>& all = engine_->events();
+    for (; from_engine_ < all.size(); ++from_engine_) {
+      events_.push_back(all[from_engine_]);
+      if (int& joint = events_.back().joint; joint >= 0) joint = joint_of_[at(joint)];
+    }
+  }
+  double next_switch() const {
+    double next = JointWindow::kNever;
+    for (std::size_t j = 0; j < status_.size(); ++j) {
+      const auto& window = scene_.joints[j].window;
+      if (!window || status_[j] == Status::over) continue;
+      next = std::min(next, status_[j] == Status::waiting ? window->from : window->to);
+    }
+    return next;
+  }
+  bool is_due(double time) const {
+    return this->time() >= time - kSameFigure * std::min(step_, time);
+  }
+  void switch_joints() {
+    std::vector<int> opening, closing;
+    for (std::size_t j = 0; j < status_.size(); ++j) {
+      const auto& window = scene_.joints[j].window;
+      if (!window) continue;
+      if (status_[j] == Status::holding && is_due(window->to))
+        opening.push_back(static_cast<int>(j));
+      if (status_[j] == Status::waiting && is_due(window->from))
+        closing.push_back(static_cast<int>(j));
+    }
+    scene_.start = SceneStart{time(), bodies()};
+    const double potential = engine_->diagnostics().potential_energy;
+    change(opening, Kind::detach, 0);
+    for (const int j : closing) {
+      take_places(scene_, time(), bodies(), scene_.joints[at(j)]);
+      status_[at(j)] = Status::holding;
+    }
+    Scene now = holding();
+    double lost = 0;
+    if (!closing.empty()) {
+      std::vector<int> places;
+      for (const int j : closing)
+        places.push_back(
+            static_cast<int>(std::count(status_.begin(), status_.begin() + j, Status::holding)));
+      lost = close(now, time(), places, now.start->bodies);
+      scene_.start = now.start;
+    }
+    const std::size_t event = change(closing, Kind::attach, lost);
+    begin(now);
+    const auto is_sprung = [&](int j) { return scene_.joints[at(j)].spring.has_value(); };
+    if (any_of(closing, is_sprung))
+      events_[event].lost += potential - engine_->diagnostics().potential_energy;
+  }
+  void snap() {
+    const int joint = joint_of_[largest_load(engine_->forces()).joint];
+    scene_.start = SceneStart{time(), bodies()};
+    change({joint}, Kind::snap, 0);
+    begin(holding());
+  }
+  std::size_t change(const std::vector<int>& joints, Kind kind, double lost) {
+    const std::size_t first = events_.size();
+    for (const int j : joints) {
+      status_[at(j)] = kind == Kind::attach ? Status::holding : Status::over;
+      ContactEvent event;
+      event.time = time();
+      event.kind = kind;
+      event.joint = j;
+      event.first = scene_.joints[at(j)].first;
+      event.second = scene_.joints[at(j)].second;
+      if (events_.size() == first) event.lost = lost;
+      events_.push_back(event);
+    }
+    return first;
+  }
   struct Load {
     std::size_t joint = 0;  // of the engine
     double share = 0;       // of its bound
   };
-  Load largest_load(const Forces& forces) const;
+  Load largest_load(const Forces& forces) const {
+    Load most;
+    for (std::size_t k = 0; k < joint_of_.size(); ++k) {
+      const auto& window = scene_.joints[at(joint_of_[k])].window;
+      const double share = window ? load_of(*window, forces.joints[k]) : 0;
+      if (share > most.share) most = {k, share};
+    }
+    return most;
+  }
   double excess(const Forces& forces) const { return largest_load(forces).share - 1; }
   template <class Self>
-  static void exchange(Self& self, binary::Archive& io);
+  static void exchange(Self& self, binary::Archive& io) {
+    for (std::size_t j = 0; j < self.status_.size(); ++j) {
+      auto& joint = self.scene_.joints[j];
+      if (!joint.window) continue;
+      io(self.status_[j]);
+      io.demand(self.status_[j] <= Status::over);
+      bool closed = joint.closed.has_value();
+      Pose pose = joint.closed.value_or(Pose{});
+      double length = joint.length.value_or(0), target = joint.motor ? joint.motor->target : 0;
+      io(closed, pose.position, pose.orientation, length, target);
+      io.demand(std::abs(pose.orientation.norm() - 1) < 1e-6 && std::isfinite(length) &&
+                length >= 0 && std::isfinite(target));
+      if constexpr (!std::is_const_v<Self>) {
+        joint.closed.reset();
+        if (closed) joint.closed = pose;
+        if (joint.kind == JointKind::distance && length > 0) joint.length = length;
+        if (joint.motor) joint.motor->target = target;
+      }
+    }
+    bool started = self.scene_.start.has_value();
+    SceneStart start = self.scene_.start.value_or(SceneStart{});
+    start.bodies.resize(self.scene_.bodies.size());
+    io(started);
+    exchange_bodies(io, start.time, start.bodies);
+    io.demand(start.time >= 0 && std::isfinite(start.time));
+    if constexpr (!std::is_const_v<Self>) {
+      self.scene_.start.reset();
+      if (started) self.scene_.start = std::move(start);
+    }
+  }
 
   Scene scene_;  // with the places of what has closed, and the start of the present engine
   MakeEngine make_;
@@ -98,253 +313,6 @@ class SwitchingEngine final : public Engine {
   Counts before_, start_;        // of engines before this one; of this one at its start
   std::vector<EffectCost> costs_before_;
 };
-
-Counts SwitchingEngine::counts() const {
-  Counts out = before_, start = start_;
-  out += engine_->counts();
-  start.each([](long& n) { n = -n; });
-  out += start;
-  return out;
-}
-
-std::vector<EffectCost> SwitchingEngine::costs() const {
-  std::vector<EffectCost> out = engine_->costs();
-  for (const EffectCost& before : costs_before_) {
-    const auto same = std::find_if(out.begin(), out.end(), [&](const EffectCost& each) {
-      return each.effect == before.effect;
-    });
-    if (same == out.end())
-      out.push_back(before);
-    else
-      same->seconds += before.seconds;
-  }
-  return out;
-}
-
-// The scene of the joints that hold, from scene_.start on.
-Scene SwitchingEngine::holding() const {
-  Scene now = scene_;
-  now.joints.clear();
-  std::vector<int> place(scene_.joints.size(), -1);
-  for (std::size_t j = 0; j < scene_.joints.size(); ++j) {
-    if (status_[j] != Status::holding) continue;
-    place[j] = static_cast<int>(now.joints.size());
-    now.joints.push_back(scene_.joints[j]);
-    now.joints.back().window.reset();
-  }
-  for (Coupling& each : now.couplings)
-    for (int& joint : each.joints) joint = place[at(joint)];
-  return now;
-}
-
-void SwitchingEngine::begin(const Scene& now) {
-  if (engine_) {
-    before_ = counts();
-    costs_before_ = costs();
-  }
-  joint_of_.clear();
-  breaks_ = false;
-  for (std::size_t j = 0; j < scene_.joints.size(); ++j) {
-    if (status_[j] != Status::holding) continue;
-    joint_of_.push_back(static_cast<int>(j));
-    breaks_ = breaks_ || (scene_.joints[j].window && scene_.joints[j].window->breaks());
-  }
-  try {
-    engine_ = make_(now);
-  } catch (const std::invalid_argument& e) {
-    if (!scene_.start) throw;
-    throw SimulationError(
-        fmt::format("t = {:g} s: the motion cannot go on where joints attach, detach or break: {}",
-                    scene_.start->time, e.what()));
-  }
-  start_ = engine_->counts();
-  from_engine_ = 0;
-  engine_->stop_when([this] { return interrupted(); });
-  if (breaks_) engine_->stop_above([this](const Forces& forces) { return excess(forces); });
-  append_events();
-}
-
-void SwitchingEngine::append_events() {
-  const std::vector<ContactEvent>& all = engine_->events();
-  for (; from_engine_ < all.size(); ++from_engine_) {
-    events_.push_back(all[from_engine_]);
-    if (int& joint = events_.back().joint; joint >= 0) joint = joint_of_[at(joint)];
-  }
-}
-
-SwitchingEngine::Load SwitchingEngine::largest_load(const Forces& forces) const {
-  Load most;
-  for (std::size_t k = 0; k < joint_of_.size(); ++k) {
-    const auto& window = scene_.joints[at(joint_of_[k])].window;
-    const double share = window ? load_of(*window, forces.joints[k]) : 0;
-    if (share > most.share) most = {k, share};
-  }
-  return most;
-}
-
-double SwitchingEngine::next_switch() const {
-  double next = JointWindow::kNever;
-  for (std::size_t j = 0; j < status_.size(); ++j) {
-    const auto& window = scene_.joints[j].window;
-    if (!window || status_[j] == Status::over) continue;
-    next = std::min(next, status_[j] == Status::waiting ? window->from : window->to);
-  }
-  return next;
-}
-
-bool SwitchingEngine::is_due(double time) const {
-  return this->time() >= time - kSameFigure * std::min(step_, time);
-}
-
-// An engine that has stopped early for no interruption is where a joint breaks; one of steps is at
-// the end of the step.
-void SwitchingEngine::advance(double t) {
-  for (;;) {
-    const double target = std::min(t, next_switch());
-    if (time() < target) engine_->advance(target);
-    append_events();
-    if (interrupted()) return;
-    if (breaks_ && (!is_due(target) || excess(engine_->forces()) > 0))
-      snap();
-    else if (is_due(next_switch()))
-      switch_joints();
-    else
-      return;
-  }
-}
-
-std::size_t SwitchingEngine::change(const std::vector<int>& joints, Kind kind, double lost) {
-  const std::size_t first = events_.size();
-  for (const int j : joints) {
-    status_[at(j)] = kind == Kind::attach ? Status::holding : Status::over;
-    ContactEvent event;
-    event.time = time();
-    event.kind = kind;
-    event.joint = j;
-    event.first = scene_.joints[at(j)].first;
-    event.second = scene_.joints[at(j)].second;
-    if (events_.size() == first) event.lost = lost;
-    events_.push_back(event);
-  }
-  return first;
-}
-
-void SwitchingEngine::switch_joints() {
-  std::vector<int> opening, closing;
-  for (std::size_t j = 0; j < status_.size(); ++j) {
-    const auto& window = scene_.joints[j].window;
-    if (!window) continue;
-    if (status_[j] == Status::holding && is_due(window->to)) opening.push_back(static_cast<int>(j));
-    if (status_[j] == Status::waiting && is_due(window->from))
-      closing.push_back(static_cast<int>(j));
-  }
-  scene_.start = SceneStart{time(), bodies()};
-  const double potential = engine_->diagnostics().potential_energy;
-  change(opening, Kind::detach, 0);
-  for (const int j : closing) {
-    take_places(scene_, time(), bodies(), scene_.joints[at(j)]);
-    status_[at(j)] = Status::holding;
-  }
-  Scene now = holding();
-  double lost = 0;
-  if (!closing.empty()) {
-    std::vector<int> places;
-    for (const int j : closing)
-      places.push_back(
-          static_cast<int>(std::count(status_.begin(), status_.begin() + j, Status::holding)));
-    lost = close(now, time(), places, now.start->bodies);
-    scene_.start = now.start;
-  }
-  const std::size_t event = change(closing, Kind::attach, lost);
-  begin(now);
-  const auto is_sprung = [&](int j) { return scene_.joints[at(j)].spring.has_value(); };
-  if (any_of(closing, is_sprung))
-    events_[event].lost += potential - engine_->diagnostics().potential_energy;
-}
-
-void SwitchingEngine::snap() {
-  const int joint = joint_of_[largest_load(engine_->forces()).joint];
-  scene_.start = SceneStart{time(), bodies()};
-  change({joint}, Kind::snap, 0);
-  begin(holding());
-}
-
-// Joints that do not hold are where the first body has them.
-Forces SwitchingEngine::forces() const {
-  Forces out = engine_->forces();
-  std::vector<JointForce> all(scene_.joints.size());
-  for (std::size_t j = 0; j < all.size(); ++j) {
-    const Joint& joint = scene_.joints[j];
-    all[j].at = joint.at;
-    if (joint.first < 0) continue;
-    const Body& start = scene_.bodies[at(joint.first)];
-    const BodyState& now = bodies()[at(joint.first)];
-    all[j].at = now.position + now.orientation * (start.orientation.normalized().conjugate() *
-                                                  (joint.at - start.position));
-  }
-  for (std::size_t k = 0; k < joint_of_.size(); ++k) all[at(joint_of_[k])] = out.joints[k];
-  out.joints = std::move(all);
-  return out;
-}
-
-template <class Self>
-void SwitchingEngine::exchange(Self& self, binary::Archive& io) {
-  for (std::size_t j = 0; j < self.status_.size(); ++j) {
-    auto& joint = self.scene_.joints[j];
-    if (!joint.window) continue;
-    io(self.status_[j]);
-    io.demand(self.status_[j] <= Status::over);
-    bool closed = joint.closed.has_value();
-    Pose pose = joint.closed.value_or(Pose{});
-    double length = joint.length.value_or(0), target = joint.motor ? joint.motor->target : 0;
-    io(closed, pose.position, pose.orientation, length, target);
-    io.demand(std::abs(pose.orientation.norm() - 1) < 1e-6 && std::isfinite(length) &&
-              length >= 0 && std::isfinite(target));
-    if constexpr (!std::is_const_v<Self>) {
-      joint.closed.reset();
-      if (closed) joint.closed = pose;
-      if (joint.kind == JointKind::distance && length > 0) joint.length = length;
-      if (joint.motor) joint.motor->target = target;
-    }
-  }
-  bool started = self.scene_.start.has_value();
-  SceneStart start = self.scene_.start.value_or(SceneStart{});
-  start.bodies.resize(self.scene_.bodies.size());
-  io(started);
-  exchange_bodies(io, start.time, start.bodies);
-  io.demand(start.time >= 0 && std::isfinite(start.time));
-  if constexpr (!std::is_const_v<Self>) {
-    self.scene_.start.reset();
-    if (started) self.scene_.start = std::move(start);
-  }
-}
-
-void SwitchingEngine::save(std::ostream& out) const {
-  write_bodies(out, time(), bodies(), kSwitched);
-  binary::Archive io(out);
-  exchange(*this, io);
-  engine_->save(out);
-}
-
-void SwitchingEngine::restore(std::istream& in, Restore how) {
-  const char* const no_such_state = "this is no state of joints that attach, detach or break";
-  skip_bodies(in, scene_.bodies.size(), no_such_state);
-  if (!binary::begins(in, kSwitched)) throw std::runtime_error(no_such_state);
-  binary::Archive io(in);
-  exchange(*this, io);
-  events_.clear();
-  engine_.reset();
-  before_ = Counts();
-  costs_before_.clear();
-  try {
-    begin(holding());
-  } catch (const SimulationError& e) {
-    throw std::runtime_error(std::string("the saved state is damaged: ") + e.what());
-  }
-  events_.clear();
-  engine_->restore(in, how);
-  start_ = Counts();
-}
 
 }  // namespace
 

@@ -129,8 +129,54 @@ struct PointOnPlane {
 struct CrossingFeature {
   Segment first, second;
 
-  Touch touch(const Frame<double>& A, const Frame<double>& B) const;
-  double margin(const Frame<double>& A, const Frame<double>& B) const;
+  Touch touch(const Frame<double>& A, const Frame<double>& B) const {
+    using mechanics::direction;
+    const Jet<double> a = mechanics::point<2>(A, first.at);
+    const Jet<double> e = direction<2>(A, first.along), f = direction<2>(B, second.along);
+    const auto [d, d1, d2] = way(mechanics::point<2>(B, second.at), a);
+    Vector3d c = e.x.cross(f.x), c1 = e.x1.cross(f.x) + e.x.cross(f.x1),
+             c2 = e.x2.cross(f.x) + 2 * e.x1.cross(f.x1) + e.x.cross(f.x2);
+    Touch t;
+    const double square = c.squaredNorm();
+    if (square < kParallel) {
+      t.gap = kNowhere;
+      t.point = a.x;
+      return t;
+    }
+    const double s = sign(B, second, c, d), D = std::sqrt(square), D1 = s * c.dot(c1) / D;
+    const Vector3d n = s * c / D, n1 = (s * c1 - s * D1 * n) / D;
+    const double along1 = s * D1;  // D' = n.c' of the signed c
+    const double along2 = n1.dot(s * c1) + n.dot(s * c2);
+    const Vector3d n2 = (s * c2 - along2 * n - 2 * along1 * n1) / D;
+    t.normal = n;
+    t.normal_rate = n1;
+    t.gap = n.dot(d) - first.radius - second.radius;
+    t.rate = n1.dot(d) + n.dot(d1);
+    t.second = n2.dot(d) + 2 * n1.dot(d1) + n.dot(d2);
+    // The point of the first line that is nearest to the second one, and its velocity.
+    const double k = -d.cross(f.x).dot(c) / square;
+    const double k1 =
+        (-(d1.cross(f.x) + d.cross(f.x1)).dot(c) - d.cross(f.x).dot(c1) - 2 * k * c.dot(c1)) /
+        square;
+    t.point = a.x + k * e.x - first.radius * n;
+    t.point_velocity = a.x1 + k1 * e.x + k * e.x1 - first.radius * n1;
+    return t;
+  }
+  double margin(const Frame<double>& A, const Frame<double>& B) const {
+    const Vector3d d = mechanics::point<0>(A, first.at).x - mechanics::point<0>(B, second.at).x;
+    const Vector3d e = A.R * first.along, f = B.R * second.along, c = e.cross(f);
+    const double square = c.squaredNorm();
+    if (square < kParallel) return -(first.length + second.length);
+    const double s = -d.cross(f).dot(c) / square, t = -d.cross(e).dot(c) / square;
+    double least = std::min(std::min(s, first.length - s), std::min(t, second.length - t));
+    const Vector3d n = sign(B, second, c, d) * c / std::sqrt(square);
+    for (const Vector3d& inward : second.inward)
+      if (second.is_sharp())
+        least = std::min(least, second.length * (kFlush - n.dot(B.R * inward)));
+    for (const Vector3d& inward : first.inward)
+      if (first.is_sharp()) least = std::min(least, first.length * (kFlush + n.dot(A.R * inward)));
+    return least;
+  }
 
  private:
   /// Out of the second body, or from it to the first one.
@@ -141,54 +187,6 @@ struct CrossingFeature {
   }
   static constexpr double kParallel = 1e-9;  // squared sine
 };
-
-inline Touch CrossingFeature::touch(const Frame<double>& A, const Frame<double>& B) const {
-  using mechanics::direction;
-  const Jet<double> a = mechanics::point<2>(A, first.at);
-  const Jet<double> e = direction<2>(A, first.along), f = direction<2>(B, second.along);
-  const auto [d, d1, d2] = way(mechanics::point<2>(B, second.at), a);
-  Vector3d c = e.x.cross(f.x), c1 = e.x1.cross(f.x) + e.x.cross(f.x1),
-           c2 = e.x2.cross(f.x) + 2 * e.x1.cross(f.x1) + e.x.cross(f.x2);
-  Touch t;
-  const double square = c.squaredNorm();
-  if (square < kParallel) {
-    t.gap = kNowhere;
-    t.point = a.x;
-    return t;
-  }
-  const double s = sign(B, second, c, d), D = std::sqrt(square), D1 = s * c.dot(c1) / D;
-  const Vector3d n = s * c / D, n1 = (s * c1 - s * D1 * n) / D;
-  const double along1 = s * D1;  // D' = n.c' of the signed c
-  const double along2 = n1.dot(s * c1) + n.dot(s * c2);
-  const Vector3d n2 = (s * c2 - along2 * n - 2 * along1 * n1) / D;
-  t.normal = n;
-  t.normal_rate = n1;
-  t.gap = n.dot(d) - first.radius - second.radius;
-  t.rate = n1.dot(d) + n.dot(d1);
-  t.second = n2.dot(d) + 2 * n1.dot(d1) + n.dot(d2);
-  // The point of the first line that is nearest to the second one, and its velocity.
-  const double k = -d.cross(f.x).dot(c) / square;
-  const double k1 =
-      (-(d1.cross(f.x) + d.cross(f.x1)).dot(c) - d.cross(f.x).dot(c1) - 2 * k * c.dot(c1)) / square;
-  t.point = a.x + k * e.x - first.radius * n;
-  t.point_velocity = a.x1 + k1 * e.x + k * e.x1 - first.radius * n1;
-  return t;
-}
-
-inline double CrossingFeature::margin(const Frame<double>& A, const Frame<double>& B) const {
-  const Vector3d d = mechanics::point<0>(A, first.at).x - mechanics::point<0>(B, second.at).x;
-  const Vector3d e = A.R * first.along, f = B.R * second.along, c = e.cross(f);
-  const double square = c.squaredNorm();
-  if (square < kParallel) return -(first.length + second.length);
-  const double s = -d.cross(f).dot(c) / square, t = -d.cross(e).dot(c) / square;
-  double least = std::min(std::min(s, first.length - s), std::min(t, second.length - t));
-  const Vector3d n = sign(B, second, c, d) * c / std::sqrt(square);
-  for (const Vector3d& inward : second.inward)
-    if (second.is_sharp()) least = std::min(least, second.length * (kFlush - n.dot(B.R * inward)));
-  for (const Vector3d& inward : first.inward)
-    if (first.is_sharp()) least = std::min(least, first.length * (kFlush + n.dot(A.R * inward)));
-  return least;
-}
 
 // With L the shape of a Round in world axes
 //
