@@ -10,9 +10,9 @@
 #include <string>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include <tether/ida_projection.h>
-#include <tether/ida_projection/c_options.hpp>
 #include <vector>
 
+#include "c/guarded.hpp"
 #include "host.hpp"
 #include "linalg/allocations.hpp"
 #include "linalg/thrown.hpp"
@@ -198,7 +198,7 @@ TEST_CASE("C interface: every field of the options is handed on") {
   o.hold_vector = host.yp;
   o.group = group;
   o.print = !defaults.print;
-  const tp::Options cpp = tp::options_of(&o, 3);
+  const tp::Options cpp = tp::c::options_of(&o, 3);
   CHECK(cpp.advanced.metric == tp::Metric::local_correction);
   CHECK(cpp.advanced.tolerance == 0.125);
   CHECK(cpp.advanced.maximum_iterations == o.maximum_iterations);
@@ -452,7 +452,6 @@ TEST_CASE("C interface: sensitivities and gradients report what is wrong with th
   REQUIRE(tether_add_rows(set.get(), 1, circle_value, circle_jacobian, nullptr) == 0);
   const Attached projection = attach(host, set);
   REQUIRE(projection);
-  const tether_idas_functions none = {nullptr, nullptr, nullptr};
   tether_sensitivities given = {};
   given.size = sizeof given;
   const auto refused = [&](int flag, int expected, const char* text) {
@@ -460,14 +459,13 @@ TEST_CASE("C interface: sensitivities and gradients report what is wrong with th
     CHECK(contains(tether_last_error(), text));
   };
   tether_projection* p = projection.get();
-  refused(tether_project_sensitivities_with(nullptr, &given, &none), TETHER_MEM_NULL, "projection");
-  refused(tether_project_sensitivities_with(p, nullptr, &none), TETHER_MEM_NULL, "sensitivities");
-  refused(tether_project_sensitivities_with(p, &given, nullptr), TETHER_MEM_NULL, "idas");
-  refused(tether_project_sensitivities_with(p, &given, &none), TETHER_ILL_INPUT, "count = 0");
+  refused(tether_project_sensitivities(nullptr, &given), TETHER_MEM_NULL, "projection");
+  refused(tether_project_sensitivities(p, nullptr), TETHER_MEM_NULL, "sensitivities");
+  refused(tether_project_sensitivities(p, &given), TETHER_ILL_INPUT, "count = 0");
   given.count = 1;
-  refused(tether_project_sensitivities_with(p, &given, &none), TETHER_ILL_INPUT, "are null");
+  refused(tether_project_sensitivities(p, &given), TETHER_ILL_INPUT, "this program has IDA");
   given.size = 4;
-  refused(tether_project_sensitivities_with(p, &given, &none), TETHER_ILL_INPUT, "size = 4");
+  refused(tether_project_sensitivities(p, &given), TETHER_ILL_INPUT, "size = 4");
   refused(tether_make_sensitivities_consistent(p, 0.0, host.y, host.yp, nullptr, nullptr, nullptr),
           TETHER_ILL_INPUT, "project_sensitivities before");
   refused(tether_project_gradient(nullptr, 0.0, host.y, host.y), TETHER_MEM_NULL, "projection");

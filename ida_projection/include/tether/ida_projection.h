@@ -10,7 +10,6 @@
 #include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 #include <sundials/sundials_types.h>
-#include <tether/ida_projection/idas_functions.h>
 #include <tether/ida_projection/sundials_build.h>
 
 #ifdef __cplusplus
@@ -235,15 +234,8 @@ typedef struct {
 
 /** After IDASensInit with IDA_STAGGERED: from now on the sensitivities of each step are moved onto
  * C s + dg/dp = 0. */
-int tether_project_sensitivities_with(tether_projection* projection,
-                                      const tether_sensitivities* sensitivities,
-                                      const tether_idas_functions* idas);
-/** A function of the host: it brings the functions of IDAS. */
-static inline int tether_project_sensitivities(tether_projection* projection,
-                                               const tether_sensitivities* sensitivities) {
-  const tether_idas_functions idas = tether_idas_of_host();
-  return tether_project_sensitivities_with(projection, sensitivities, &idas);
-}
+int tether_project_sensitivities(tether_projection* projection,
+                                 const tether_sensitivities* sensitivities);
 /** Initial sensitivities onto C s + dg/dp = 0, sp (may be null) onto its derivative; hand them to
  * IDASensReInit. On failure s and sp are unchanged. */
 int tether_make_sensitivities_consistent(tether_projection* projection, sunrealtype t0, N_Vector yy,

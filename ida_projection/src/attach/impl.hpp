@@ -71,7 +71,7 @@ class Projection::Impl {
   void reset_statistics() { observer_.reset_statistics(); }
 
   // sensitivity/attach.cpp: a program that asks for none links none of it
-  void project_sensitivities(Sensitivities given, const tether_idas_functions& idas);
+  void project_sensitivities(Sensitivities given);
   ConsistencyReport make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp, N_Vector* s,
                                                   N_Vector* sp);
   ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);

@@ -2,10 +2,10 @@
 #include <cstring>
 #include <limits>
 #include <new>
+#include <stdexcept>
 #include <string>
 #include <tether/ida_projection.h>
 #include <tether/ida_projection.hpp>
-#include <tether/ida_projection/c_options.hpp>
 #include <tether/ida_projection/sensitivities.hpp>
 #include <utility>
 #include <vector>
@@ -24,6 +24,27 @@ struct tether_projection {
 };
 
 namespace {
+
+/// each(field for C, the same for C++): those that differ in nothing but their type.
+template <class ForC, class ForCpp, class Each>
+void for_fields(ForC& c, ForCpp& cpp, Each&& each) {
+  each(c.metric, cpp.advanced.metric);
+  each(c.tolerance, cpp.advanced.tolerance);
+  each(c.maximum_iterations, cpp.advanced.maximum_iterations);
+  each(c.largest_move, cpp.advanced.largest_move);
+  each(c.long_move, cpp.advanced.long_move);
+  each(c.id, cpp.id);
+  each(c.suppress_algebraic, cpp.suppress_algebraic);
+  each(c.polish, cpp.advanced.polish);
+  each(c.step_smoothing, cpp.step_smoothing);
+  each(c.smooth_where_needed, cpp.advanced.smooth_where_needed);
+  each(c.maximum_step, cpp.advanced.maximum_step);
+  each(c.maximum_order, cpp.advanced.maximum_order);
+  each(c.limit_order, cpp.advanced.limit_order);
+  each(c.hold_vector, cpp.advanced.hold_vector);
+  each(c.nonlinear_solver, cpp.nonlinear_solver);
+  each(c.print, cpp.print);
+}
 
 using ip::c::Arguments;
 using ip::c::fail;
@@ -105,12 +126,52 @@ int reported(const tether_projection* projection, const char* function, tether_r
 
 }  // namespace
 
+// A structure of an older header lacks the last fields.
+ip::Options ip::c::options_of(const tether_options* given, long unknowns) {
+  tether_options o;
+  tether_options_init(&o, sizeof o);
+  if (given != nullptr) {
+    if (given->size < sizeof(size_t) || given->size > sizeof o)
+      throw std::invalid_argument("options->size = " + std::to_string(given->size) +
+                                  ": call tether_options_init(options, sizeof *options) first");
+    std::memcpy(&o, given, given->size);
+  }
+  if ((o.hold != nullptr || o.group != nullptr) && unknowns <= 0)
+    throw std::invalid_argument("unknowns = " + std::to_string(unknowns) +
+                                ", must be the length of options->hold and group");
+  ip::Options options;
+  for_fields(o, options,
+             [](const auto& c, auto& cpp) { cpp = static_cast<std::decay_t<decltype(cpp)>>(c); });
+  if (o.hold != nullptr)
+    for (long i = 0; i < unknowns; ++i) options.hold.push_back(o.hold[i] != 0);
+  if (o.group != nullptr) options.group.assign(o.group, o.group + unknowns);
+  if (o.progress != nullptr)
+    options.progress = [call = o.progress, data = o.progress_data](const ip::Progress& p) {
+      call(p.t, p.step, p.order, p.drift, p.move, p.steps, data);
+    };
+  return options;
+}
+
 extern "C" {
 
 const char* tether_last_error(void) { return ip::c::last_error; }
 
 const char* tether_status_name(int status) {
   return ip::to_string(static_cast<ip::Status>(status));
+}
+
+int tether_options_init(tether_options* options, size_t size) {
+  return guarded("tether_options_init", [&](const Arguments& arguments) {
+    arguments.require(options, "options");
+    tether_options o{};
+    arguments.check(size >= sizeof(size_t) && size <= sizeof o, "size", size,
+                    "sizeof(tether_options)");
+    const ip::Options defaults;
+    for_fields(o, defaults,
+               [](auto& c, const auto& cpp) { c = static_cast<std::decay_t<decltype(c)>>(cpp); });
+    o.size = size;
+    std::memcpy(options, &o, size);
+  });
 }
 
 tether_constraints* tether_constraints_new(void) { return new (std::nothrow) tether_constraints; }
@@ -243,7 +304,7 @@ tether_projection* tether_projection_new_for(void* ida_mem, const tether_constra
     arguments.require(constraints, "constraints");
     if (constraints->rows.total_count() == 0) arguments.refuse("constraints has no rows");
     arguments.check_build(host);
-    ip::Options chosen = ip::options_of(options, unknowns);
+    ip::Options chosen = ip::c::options_of(options, unknowns);
     made = new tether_projection{{ida_mem, constraints->rows, std::move(chosen)}, {}};
   });
   if (flag != nullptr) *flag = result;
@@ -274,12 +335,10 @@ int tether_solve(tether_projection* projection, sunrealtype tout, sunrealtype* t
   });
 }
 
-int tether_project_sensitivities_with(tether_projection* projection,
-                                      const tether_sensitivities* sensitivities,
-                                      const tether_idas_functions* idas) {
+int tether_project_sensitivities(tether_projection* projection,
+                                 const tether_sensitivities* sensitivities) {
   const auto call = [&](ip::Projection& own, const Arguments& arguments) {
     arguments.require(sensitivities, "sensitivities");
-    arguments.require(idas, "idas");
     arguments.check(sensitivities->size == sizeof *sensitivities, "sensitivities->size",
                     sensitivities->size, "sizeof(tether_sensitivities)");
     const tether_sensitivities given = *sensitivities;
@@ -298,7 +357,7 @@ int tether_project_sensitivities_with(tether_projection* projection,
     if (given.scales != nullptr) chosen.scales.assign(given.scales, given.scales + count);
     if (given.list != nullptr) chosen.list.assign(given.list, given.list + count);
     chosen.nonlinear_solver = given.nonlinear_solver;
-    own.project_sensitivities(std::move(chosen), *idas);
+    own.project_sensitivities(std::move(chosen));
   };
   return with(projection, "tether_project_sensitivities", call);
 }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <tether/ida_projection.h>
+#include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/sundials_build.hpp>
 #include <type_traits>
 
@@ -79,5 +80,12 @@ int guarded(const char* function, Body&& body) noexcept {
     return fail(TETHER_INTERNAL_ERROR, "unknown exception");
   }
 }
+
+/// Options as programs in C give them; null: the defaults. `unknowns`: the length of `hold` and
+/// `group`, read only where these are given. Throws std::invalid_argument, naming the field and its
+/// value.
+TETHER_EXPORT_BEGIN
+Options options_of(const tether_options* options, long unknowns);
+TETHER_EXPORT_END
 
 }  // namespace tether::ida_projection::c

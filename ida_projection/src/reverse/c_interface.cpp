@@ -1,7 +1,6 @@
 // Tether: reverse communication for programs in C and Fortran. SPDX-License-Identifier:
 // BSD-3-Clause
 #include <string>
-#include <tether/ida_projection/c_options.hpp>
 #include <tether/reverse_ida.h>
 #include <tether/reverse_ida.hpp>
 #include <utility>
@@ -62,7 +61,7 @@ tether_reverse* tether_reverse_new_for(int n, double t0, const double* y, const 
     equations.atol = {atol};
     equations.linear = static_cast<tr::Linear>(linear);
     equations.constraints = constraints;
-    equations.options = tether::ida_projection::options_of(options, n);
+    equations.options = tether::ida_projection::c::options_of(options, n);
     made = new tether_reverse{tr::ReverseIda(std::move(equations)), {}};
   });
   if (flag != nullptr) *flag = result;

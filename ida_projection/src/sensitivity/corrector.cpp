@@ -11,6 +11,18 @@
 #include "host/rounding.hpp"
 #include "host/shortest.hpp"
 
+// As in <idas/idas.h>, which repeats typedefs of <ida/ida.h>. Programs with IDA lack them.
+extern "C" {
+#pragma weak IDASetNonlinearSolverSensStg
+#pragma weak IDAGetNonlinearSystemDataSens
+#pragma weak IDAGetSensNumLinSolvSetups
+int IDASetNonlinearSolverSensStg(void* ida_mem, SUNNonlinearSolver solver);
+int IDAGetNonlinearSystemDataSens(void* ida_mem, sunrealtype* t, N_Vector** s_predicted,
+                                  N_Vector** sp_predicted, N_Vector** s, N_Vector** sp,
+                                  sunrealtype* cj, void** user_data);
+int IDAGetSensNumLinSolvSetups(void* ida_mem, long* setups);
+}
+
 namespace tether::ida_projection {
 
 namespace {
@@ -89,12 +101,11 @@ void check(const Sensitivities& given, const Constraints& constraints) {
 
 }  // namespace
 
-SensitivityCorrector::SensitivityCorrector(Projection::Impl& state, Sensitivities given,
-                                           const tether_idas_functions& idas)
-    : state_(state), idas_(idas), given_(std::move(given)) {
+SensitivityCorrector::SensitivityCorrector(Projection::Impl& state, Sensitivities given)
+    : state_(state), given_(std::move(given)) {
   check(given_, state_.constraints_);
-  if (idas_.set_solver == nullptr || idas_.system_data == nullptr || idas_.setups == nullptr)
-    refuse("the functions of IDAS are null; call it through project_sensitivities()");
+  if (&IDASetNonlinearSolverSensStg == nullptr)
+    refuse("this program has IDA; link IDAS in its place, which has sensitivities");
   N_Vector like = state_.unknowns_.weights;
   SUNNonlinearSolver inner = given_.nonlinear_solver;
   if (inner == nullptr) {
@@ -108,7 +119,7 @@ SensitivityCorrector::SensitivityCorrector(Projection::Impl& state, Sensitivitie
   for (int k = 0; k < count(); ++k) metrics_.emplace_back(state_.options_, like);
   solver_.reset(Operations<SensitivityCorrector>::make(*this, inner, like->sunctx));
   if (!solver_) throw std::bad_alloc();
-  const int flag = idas_.set_solver(state_.ida_.mem(), solver_.get());
+  const int flag = IDASetNonlinearSolverSensStg(state_.ida_.mem(), solver_.get());
   if (flag != 0)
     refuse("IDASetNonlinearSolverSensStg returned " + std::to_string(flag) +
            "; call IDASensInit with IDA_STAGGERED before. IDA_SIMULTANEOUS corrects states and "
@@ -146,7 +157,7 @@ std::string SensitivityCorrector::set_up(N_Vector predicted) {
   sunrealtype t, cj;
   N_Vector *s = nullptr, *sp, *sn, *spn;
   void* data;
-  idas_.system_data(state_.ida_.mem(), &t, &s, &sp, &sn, &spn, &cj, &data);
+  IDAGetNonlinearSystemDataSens(state_.ida_.mem(), &t, &s, &sp, &sn, &spn, &cj, &data);
   const std::string reason = why_not_wrapped(predicted, s, count());
   if (!reason.empty()) return reason;
   variables_ = std::make_unique<AlgebraicVariables>(uncounted_);
@@ -235,7 +246,7 @@ void SensitivityCorrector::use_rows_of_state() {
 // IDAS may make new factors for sensitivities, too; both iterations divide by what they belong to.
 void SensitivityCorrector::note_setups(double cj) {
   long setups = 0;
-  idas_.setups(state_.ida_.mem(), &setups);
+  IDAGetSensNumLinSolvSetups(state_.ida_.mem(), &setups);
   if (setups != setups_) state_.polish_.note_setup(cj);
   setups_ = setups;
   polish_->follow(state_.polish_);

@@ -22,8 +22,7 @@ namespace tether::ida_projection {
 class SensitivityCorrector final : public Companion {
  public:
   /// `state`: the half of the plugin that moves the state. Throws std::invalid_argument.
-  SensitivityCorrector(Projection::Impl& state, Sensitivities given,
-                       const tether_idas_functions& idas);
+  SensitivityCorrector(Projection::Impl& state, Sensitivities given);
   ~SensitivityCorrector() override;
   SensitivityCorrector(const SensitivityCorrector&) = delete;
   SensitivityCorrector& operator=(const SensitivityCorrector&) = delete;
@@ -66,7 +65,6 @@ class SensitivityCorrector final : public Companion {
   int finish(Status status);
 
   Projection::Impl& state_;
-  tether_idas_functions idas_;
   Sensitivities given_;
   Owned<SUNNonlinearSolver, SUNNonlinSolFree> own_;
   std::unique_ptr<Corrector> corrector_;

@@ -26,9 +26,8 @@ double largest(const std::vector<double>& values) {
 
 }  // namespace
 
-void Projection::project_sensitivities(Sensitivities sensitivities,
-                                       const tether_idas_functions& idas) {
-  own(impl_).project_sensitivities(std::move(sensitivities), idas);
+void Projection::project_sensitivities(Sensitivities sensitivities) {
+  own(impl_).project_sensitivities(std::move(sensitivities));
 }
 ConsistencyReport Projection::make_sensitivities_consistent(double t0, N_Vector yy, N_Vector yp,
                                                             N_Vector* s, N_Vector* sp) {
@@ -41,12 +40,11 @@ ConsistencyReport Projection::project_gradient(double t, N_Vector yy, N_Vector v
                               [&] { return impl_->project_gradient(t, yy, v); });
 }
 
-void Projection::Impl::project_sensitivities(Sensitivities given,
-                                             const tether_idas_functions& idas) {
+void Projection::Impl::project_sensitivities(Sensitivities given) {
   if (rows_.used == nullptr) return;  // no constraints
   const std::string misused = why_misused("project_sensitivities", {});
   if (!misused.empty()) reject(misused);
-  sensitivities_ = std::make_unique<SensitivityCorrector>(*this, std::move(given), idas);
+  sensitivities_ = std::make_unique<SensitivityCorrector>(*this, std::move(given));
 }
 
 ConsistencyReport Projection::Impl::make_sensitivities_consistent(double t0, N_Vector yy,

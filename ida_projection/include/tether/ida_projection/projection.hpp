@@ -6,7 +6,6 @@
 #include <string>
 #include <tether/export.hpp>
 #include <tether/ida_projection/constraints.hpp>
-#include <tether/ida_projection/idas_functions.h>
 #include <tether/ida_projection/options.hpp>
 #include <tether/ida_projection/statistics.hpp>
 #include <tether/ida_projection/sundials_build.hpp>
@@ -123,7 +122,7 @@ class [[nodiscard]] Projection {
   int solve(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
 
   /// See <tether/ida_projection/sensitivities.hpp>, whose function of this name is to be called.
-  void project_sensitivities(Sensitivities sensitivities, const tether_idas_functions& idas);
+  void project_sensitivities(Sensitivities sensitivities);
 
   /// Initial sensitivities (as many as Sensitivities::count, after project_sensitivities) onto C
   /// s_k + dg/dp_k = 0. Likewise sp (may be null) onto the derivative of that along (y, y'), each

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <tether/export.hpp>
-#include <tether/ida_projection/idas_functions.h>
 #include <tether/ida_projection/projection.hpp>
 #include <vector>
 
@@ -39,7 +38,7 @@ struct Sensitivities {
 /// kind of constraints but UserProjection, which has no C. Without constraints it changes nothing.
 /// Throws std::invalid_argument, naming the member and its value.
 inline void project_sensitivities(Projection& projection, Sensitivities sensitivities) {
-  projection.project_sensitivities(std::move(sensitivities), tether_idas_of_host());
+  projection.project_sensitivities(std::move(sensitivities));
 }
 
 }  // namespace tether::ida_projection
