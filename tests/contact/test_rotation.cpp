@@ -32,7 +32,7 @@ TEST_CASE("rotation: a step of many radians is its two halves") {
     const Vector3d start = 20 * Vector3d::NullaryExpr([&] { return normal(random); });
     Quaternion whole = Quaternion::Identity(), parts = whole;
     Vector3d w = start, v = start;
-    FreeSpin free_whole, free_parts;
+    tether::contact::StepperMemory::Spin free_whole, free_parts;
     turn_with_momentum(inertia, inverse, 1, whole, w, free_whole);
     for (int half = 0; half < 2; ++half)
       turn_with_momentum(inertia, inverse, 0.5, parts, v, free_parts);

@@ -165,20 +165,13 @@ void IslandSweeps::add_impulse(int contact, Kind k, int place, const Vector3d& p
 
 // Each thread's own contacts, as it sweeps them: what another thread has swept comes from that
 // one's cache, which takes longer than to sweep it.
-template <class Operation>
-void IslandSweeps::own_chunks(const Island& island, const Team& team,
-                              const Operation& operation) const {
+void IslandSweeps::extrapolate(const Island& island, const Team& team, double beta) {
   for (int k = island.colour_begin; k < island.colour_end; ++k) {
     const int first = graph_->colours[at(k)], last = graph_->colours[at(k + 1)];
-    operation(cut(first, last, team.thread, team.threads),
-              cut(first, last, team.thread + 1, team.threads));
-  }
-}
-
-void IslandSweeps::extrapolate(const Island& island, const Team& team, double beta) {
-  own_chunks(island, team, [&](int begin, int end) {
+    const int begin = cut(first, last, team.thread, team.threads);
+    const int end = cut(first, last, team.thread + 1, team.threads);
     contacts_.extrapolate(graph_->chunks[at(begin)], graph_->chunks[at(end)], beta);
-  });
+  }
   bodies_.extrapolate(team.from(island.body_begin, island.body_end),
                       team.to(island.body_begin, island.body_end), beta);
   team.meet();

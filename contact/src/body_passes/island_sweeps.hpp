@@ -111,9 +111,6 @@ class IslandSweeps {
   template <class Operation>
   PassResult over_kinds(int chunk, const Team& team, const Operation& operation);
   int cut(int begin, int end, int k, int parts) const;
-  // operation(chunk, chunk) for each run of chunks that this thread sweeps.
-  template <class Operation>
-  void own_chunks(const Island& island, const Team& team, const Operation& operation) const;
   PassResult pack_contact(int contact, Kind k, int place, const Vector3d* start);
   void unpack_contact(int contact, Kind k, int place, BodySolution& out) const;
 

@@ -89,12 +89,12 @@ GeneralContact packed_general(const Side& s, const PointContact& c, double& slip
   return p;
 }
 
-// The impulses of an entry of a list, one after the other.
-double* impulses(GeneralGroup& g) { return &g.x[0][0]; }
-double* impulses(SphereGroup& g) { return &g.p[0][0]; }
-double* impulses(GeneralContact& c) { return c.x; }
-double* impulses(SphereContact& c) { return c.p; }
-double* impulses(SmoothContact& c) { return &c.x; }
+// The impulses of an entry of a list: numbers one after the other.
+auto& impulses(GeneralGroup& g) { return g.x; }
+auto& impulses(SphereGroup& g) { return g.p; }
+auto& impulses(GeneralContact& c) { return c.x; }
+auto& impulses(SphereContact& c) { return c.p; }
+auto& impulses(SmoothContact& c) { return c.x; }
 
 // The impulse in world axes.
 Vector3d world_impulse(const SmoothContact& c) { return c.x * load(c.n); }
@@ -120,15 +120,6 @@ void set_state_of(GeneralContact& c, const Eigen::Vector4d& s) {
   store(s.head<3>(), c.x);
   c.lambda = s[3];
 }
-
-template <class Entry>
-constexpr int kImpulses = 3;
-template <>
-constexpr int kImpulses<GeneralGroup> = 12;
-template <>
-constexpr int kImpulses<SphereGroup> = 12;
-template <>
-constexpr int kImpulses<SmoothContact> = 1;
 
 }  // namespace
 
@@ -235,8 +226,8 @@ void PackedContacts::extrapolate(const Chunk& from, const Chunk& to, double beta
   double* previous = previous_.data() + 3 * at(from.place);
   for_kinds(from, to, [&](auto* begin, auto* end, int) {
     for (auto* entry = begin; entry < end; ++entry) {
-      constexpr int n = kImpulses<std::remove_reference_t<decltype(*entry)>>;
-      detail::extrapolate<n>(beta, impulses(*entry), previous);
+      constexpr int n = sizeof(impulses(*entry)) / sizeof(double);
+      detail::extrapolate<n>(beta, reinterpret_cast<double*>(&impulses(*entry)), previous);
       previous += n;
     }
   });

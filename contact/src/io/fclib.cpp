@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <type_traits>
 
 #include "io/file_problem.hpp"
 #ifdef TETHER_HAVE_HDF5
@@ -61,15 +62,9 @@ struct Quiet {
 };
 
 template <class T>
-struct Native;
-template <>
-struct Native<int> {
-  static hid_t type() { return H5T_NATIVE_INT; }
-};
-template <>
-struct Native<double> {
-  static hid_t type() { return H5T_NATIVE_DOUBLE; }
-};
+hid_t native() {
+  return std::is_same_v<T, int> ? H5T_NATIVE_INT : H5T_NATIVE_DOUBLE;
+}
 
 constexpr hssize_t kMostEntries = hssize_t{1} << 31;
 constexpr hsize_t kBestCompression =
@@ -124,7 +119,7 @@ std::vector<T> read(hid_t file, const std::string& path, const std::string& name
   check_storage(set, full);
   const std::size_t count = believable_count<T>(file, set, full);
   std::vector<T> out(count);
-  if (count > 0 && H5Dread(set, Native<T>::type(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {
+  if (count > 0 && H5Dread(set, native<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, out.data()) < 0) {
     throw std::runtime_error(full + " cannot be read; the file is truncated or of another kind");
   }
   return out;
@@ -275,10 +270,10 @@ void write(hid_t file, const std::string& path, const std::string& name, const T
   Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose);
   Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links, 1);
-  Handle set(H5Dcreate2(file, ("/fclib_local/" + name).c_str(), Native<T>::type(), space, links,
+  Handle set(H5Dcreate2(file, ("/fclib_local/" + name).c_str(), native<T>(), space, links,
                         H5P_DEFAULT, H5P_DEFAULT),
              H5Dclose);
-  if (set < 0 || H5Dwrite(set, Native<T>::type(), H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
+  if (set < 0 || H5Dwrite(set, native<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
     throw std::runtime_error(path + ": " + name + " cannot be written");
   }
 }

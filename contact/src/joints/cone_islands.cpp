@@ -27,8 +27,6 @@ Vector3d in_circle(const std::array<Vector3d, 2>& tangents, const Vector3d& norm
 
 }  // namespace
 
-void ConeSources::hold_moments(const NearContacts& of) { near = &of; }
-
 ConeIslands::ConeIslands(ConeSources& sources, LawUse use, const BodyOptions& options)
     : mechanisms_(sources.mechanisms),
       laws_(sources.laws ? &*sources.laws : nullptr),

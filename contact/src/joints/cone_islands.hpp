@@ -35,7 +35,6 @@ struct ConeSources {
   /// each contact, world axes, N m s.
   std::vector<Eigen::Vector3d> moments;
 
-  void hold_moments(const NearContacts& of);
   /// Whether problems have such islands. Position corrections have no friction.
   bool any(LawUse use) const { return laws || (near != nullptr && use != LawUse::limits); }
 };
@@ -83,34 +82,27 @@ class ConeIslands {
   std::vector<Vector6d> v_;
 };
 
-/// A BodySolver, and ConeIslands where there are such.
-class StepSolver {
+/// A BodySolver, and ConeIslands where there are such. Warm starts have the impulses of all
+/// contacts.
+class StepSolver : public BodySolver {
  public:
-  StepSolver(const BodyOptions& options, ConeSources& sources, LawUse use) : solver_(options) {
+  StepSolver(const BodyOptions& options, ConeSources& sources, LawUse use) : BodySolver(options) {
     if (sources.any(use)) cones_.emplace(sources, use, options);
   }
 
   void solve(const std::vector<RigidBody>& bodies, const std::vector<PointContact>& contacts,
              BodySolution& out) {
     if (cones_)
-      cones_->solve(solver_, bodies, contacts, out);
+      cones_->solve(*this, bodies, contacts, out);
     else
-      solver_.solve(bodies, contacts, out);
+      BodySolver::solve(bodies, contacts, out);
   }
-  const BodyOptions& options() const { return solver_.options(); }
   void set_options(const BodyOptions& options) {
-    solver_.set_options(options);
+    BodySolver::set_options(options);
     if (cones_) cones_->set_options(options);
   }
-  void scale_warm_start(double factor) { solver_.scale_warm_start(factor); }
-  void take_back() { solver_.take_back(); }
-  void forget() { solver_.forget(); }
-  /// Impulses of all contacts.
-  WarmStart warm_start() const { return solver_.warm_start(); }
-  void set_warm_start(const WarmStart& start) { solver_.set_warm_start(start); }
 
  private:
-  BodySolver solver_;
   std::optional<ConeIslands> cones_;
 };
 

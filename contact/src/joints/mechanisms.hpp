@@ -1,12 +1,19 @@
 // Tether: bodies that joints connect (method, eq. 30). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <memory>
+#include <numeric>
 #include <tether/contact/joints.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>
 #include <vector>
 
 namespace tether::contact::detail {
+
+/// Length of a vector.
+inline double norm(const std::vector<double>& u) {
+  return std::sqrt(std::inner_product(u.begin(), u.end(), u.begin(), 0.0));
+}
 
 /// One connected set of moving bodies and the rows on them. Velocities are scaled here, u = C^-1 v
 /// with C C' the inverse mass of each body, so that |u|^2 / 2 is the kinetic energy:

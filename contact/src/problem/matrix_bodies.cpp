@@ -49,7 +49,6 @@ class MatrixBodies {
   }
   BodyForm find() {
     rows_of_.resize(at(problem_.contacts()));
-    place_.resize(rows_of_.size());
     for (std::size_t c = 0; c < classes_.size(); ++c) find_rows(static_cast<int>(c));
     for (std::size_t c = 0; c < classes_.size(); ++c) find_blocks(static_cast<int>(c));
     while (!open_.empty()) eliminate(next());
@@ -96,32 +95,14 @@ class MatrixBodies {
     }
   }
 
-  Eigen::Vector3d diagonal_of(int i) const {
-    const auto begin = problem_.columns().begin();
-    const auto k = std::lower_bound(begin + problem_.row_start()[at(i)],
-                                    begin + problem_.row_start()[at(i + 1)], i);
-    return as_matrix(problem_.blocks()[at(static_cast<int>(k - begin))]).diagonal();
-  }
-
   void find_rows(int number) {
     Class& c = classes_[at(number)];
-    for (std::size_t m = 0; m < c.contacts.size(); ++m) place_[at(c.contacts[m])] = 3 * m;
-    VectorXd diagonal(3 * c.contacts.size());
-    for (int i : c.contacts) diagonal.segment<3>(place_[at(i)]) = diagonal_of(i);
-    const auto column = [&](Eigen::Index row) {
-      const int i = c.contacts[at(static_cast<int>(row / 3))];
-      VectorXd out = VectorXd::Zero(diagonal.size());
-      for (int k = problem_.row_start()[at(i)]; k < problem_.row_start()[at(i + 1)]; ++k) {
-        const int j = problem_.columns()[at(k)];
-        if (class_of_[at(j)] == number)
-          out.segment<3>(place_[at(j)]) = as_matrix(problem_.blocks()[at(k)]).row(row % 3);
-      }
-      return out;
-    };
+    const MatrixXd A = problem_.part(c.contacts).dense_matrix();
+    const VectorXd diagonal = A.diagonal();
     std::vector<int> rows;
     const MatrixXd G = pivoted_cholesky(
         diagonal, diagonal.size(), VectorXd::Constant(diagonal.size(), kRank * diagonal.maxCoeff()),
-        column, &rows);
+        [&](Eigen::Index row) { return A.row(row).transpose(); }, &rows);
     MatrixXd determining(G.cols(), G.cols());  // lower triangular
     c.diagonal.resize(G.cols());
     for (Eigen::Index r = 0; r < G.cols(); ++r) {
@@ -284,7 +265,6 @@ class MatrixBodies {
   const Problem& problem_;
   std::vector<Class> classes_;
   std::vector<int> class_of_;              // of each contact
-  std::vector<Eigen::Index> place_;        // of each contact, its first row in its class
   std::vector<std::vector<Row>> rows_of_;  // of each contact, those that determine others
   std::set<int> open_, changed_;           // not eliminated; with other neighbours than before
   std::vector<Turn> turns_;

@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <numeric>
 #include <stdexcept>
@@ -148,18 +149,14 @@ PassResult RankTeam::Implementation::total(const std::vector<PassResult>& of_chu
                &part = plan.part.islands[at(island_now)];
   sums.assign(4 * at(whole.chunk_end - whole.chunk_begin), 0);
   for (int c = part.chunk_begin; c < part.chunk_end; ++c) {
-    double* four = sums.data() + 4 * at(plan.chunk_of[at(c)] - whole.chunk_begin);
-    four[0] = of_chunks[at(c)].sum;
-    four[1] = of_chunks[at(c)].most;
-    four[2] = of_chunks[at(c)].speed;
-    four[3] = of_chunks[at(c)].started;
+    const PassResult& r = of_chunks[at(c)];
+    const auto place = 4 * (plan.chunk_of[at(c)] - whole.chunk_begin);
+    std::copy_n(std::array{r.sum, r.most, r.speed, r.started}.begin(), 4, sums.begin() + place);
   }
   messages.sum(sums);
   PassResult total;
   for (std::size_t c = 0; c < sums.size(); c += 4) {
-    PassResult r;
-    r.sum = sums[c];
-    r.most = sums[c + 1];
+    PassResult r(detail::Squares{sums[c], sums[c + 1]});
     r.speed = sums[c + 2];
     r.started = sums[c + 3];
     total.add(r);

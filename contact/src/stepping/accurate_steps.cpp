@@ -119,16 +119,13 @@ void AccurateSteps::list_moments(std::vector<Active>& list) const {
     if (!(normal > 0)) continue;
     const Meeting& m = stepper_.near->meeting(c);
     const Vector3d spin = c.normal.dot(moments[k]) * c.normal, roll = moments[k] - spin;
-    if (m.rolling > 0) {
-      const bool turns = !(roll.norm() < kSlips * m.rolling * normal);
-      list.push_back(
-          {c.id, turns ? Behaviour::rolls : Behaviour::rolls_not, turns ? roll : Vector3d::Zero()});
-    }
-    if (m.torsional > 0) {
-      const bool turns = !(spin.norm() < kSlips * m.torsional * normal);
-      list.push_back(
-          {c.id, turns ? Behaviour::spins : Behaviour::spins_not, turns ? spin : Vector3d::Zero()});
-    }
+    const auto add = [&](double bound, const Vector3d& moment, Behaviour moves, Behaviour rests) {
+      const bool turns = !(moment.norm() < kSlips * bound * normal);
+      if (bound > 0)
+        list.push_back({c.id, turns ? moves : rests, turns ? moment : Vector3d::Zero()});
+    };
+    add(m.rolling, roll, Behaviour::rolls, Behaviour::rolls_not);
+    add(m.torsional, spin, Behaviour::spins, Behaviour::spins_not);
   }
 }
 
@@ -250,12 +247,12 @@ void AccurateSteps::extrapolate() {
     Vector3d& w = stepper_.bodies.motion[i].angular_velocity;
     w += w - whole_.motion[i].angular_velocity;
   };
-  const std::vector<FreeSpin>& spins = stepper_.motion.spins();
+  const std::vector<StepperMemory::Spin>& spins = stepper_.motion.spins();
   std::size_t next = 0;
   for (const int k : stepper_.motion.moving()) {
     if (next < spins.size() && stepper_.motion.free_long()[next] == k) {
       const std::size_t s = next++;
-      if (spins[s].L == whole_.spin[s].L) continue;
+      if (spins[s].momentum == whole_.spin[s].momentum) continue;
     }
     turn(k);
   }

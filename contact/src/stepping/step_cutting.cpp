@@ -13,20 +13,16 @@ namespace {
 
 // Adds the impulses of `from` for contacts that `to` does not have: a solver that had nothing to
 // solve in between keeps its warm start.
-void add_missing(const WarmStart& from, WarmStart& to) {
-  std::vector<std::uint64_t> known = to.ids;
-  std::sort(known.begin(), known.end());
-  for (std::size_t k = 0; k < from.ids.size(); ++k) {
-    if (std::binary_search(known.begin(), known.end(), from.ids[k])) continue;
-    to.ids.push_back(from.ids[k]);
-    to.impulses.push_back(from.impulses[k]);
-  }
-}
-
 template <class Solver>
 void add_missing(const WarmStart& from, Solver& to) {
   WarmStart both = to.warm_start();
-  add_missing(from, both);
+  std::vector<std::uint64_t> known = both.ids;
+  std::sort(known.begin(), known.end());
+  for (std::size_t k = 0; k < from.ids.size(); ++k) {
+    if (std::binary_search(known.begin(), known.end(), from.ids[k])) continue;
+    both.ids.push_back(from.ids[k]);
+    both.impulses.push_back(from.impulses[k]);
+  }
   to.set_warm_start(both);
 }
 

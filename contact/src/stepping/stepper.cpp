@@ -144,8 +144,7 @@ StepperMemory Stepper::memory() const {
   if (s.solver) m.contacts = s.solver->warm_start();
   if (s.positions) m.corrections = s.positions->warm_start();
   if (s.restitution) m.bounces = s.restitution->warm_start();
-  for (const detail::FreeSpin& each : s.motion.spins())
-    m.spins.push_back({each.L, each.w, {each.q.x(), each.q.y(), each.q.z(), each.q.w()}});
+  m.spins = s.motion.spins();
   m.last = s.contacts;
   m.penetration = s.tally.deepest;
   m.residual = s.tally.residual;
@@ -170,11 +169,7 @@ void Stepper::set_memory(const StepperMemory& m) {
   if (s.solver) s.solver->set_warm_start(m.contacts);
   if (s.positions) s.positions->set_warm_start(m.corrections);
   if (s.restitution) s.restitution->set_warm_start(m.bounces);
-  for (std::size_t k = 0; k < m.spins.size(); ++k) {
-    const std::array<double, 4>& q = m.spins[k].orientation;
-    s.motion.spins()[k] = {
-        m.spins[k].momentum, m.spins[k].angular_velocity, {q[3], q[0], q[1], q[2]}};
-  }
+  s.motion.spins() = m.spins;
   s.contacts = m.last;
   s.tally.deepest = m.penetration;
   s.tally.residual = m.residual;

@@ -55,7 +55,7 @@ struct BodiesState {
   std::vector<Eigen::Vector3d> position;
   std::vector<linalg::Quaternion> orientation;
   std::vector<RigidBody> motion;
-  std::vector<FreeSpin> spin;
+  std::vector<StepperMemory::Spin> spin;
 };
 
 /// State to which a step may go back: bodies and warm starts.

@@ -73,7 +73,7 @@ void SubStepper::make_solvers() {
   const double bounce = threshold_speed(options.restitution_threshold, options);
   const bool laws = joints && joints->has_laws(),
              bounces = near && near->any([](const Meeting&m) { return m.restitution > 0; });
-  if (near && (near->any_rolling() || near->any_elliptic())) cones.hold_moments(*near);
+  if (near && (near->any_rolling() || near->any_elliptic())) cones.near = near.get();
   const auto new_restitution = [&](LawUse use) {
     return std::make_unique<Restitution>(options.restitution_law, o, cones, use);
   };

@@ -170,8 +170,7 @@ void exchange(Archive& io, int bodies, StepperMemory& m) {
   io.demand(m.steps >= 0, "it has no time");
   for (contact::WarmStart* each : {&m.contacts, &m.corrections, &m.bounces}) exchange(io, *each);
   io.list(m.spins, [&](StepperMemory::Spin& spin) {
-    Eigen::Map<Eigen::Vector4d> orientation(spin.orientation.data());
-    io(spin.momentum, spin.angular_velocity, orientation);
+    io(spin.momentum, spin.angular_velocity, spin.orientation);
   });
   exchange(io, bodies, m.last);
   io(m.penetration, m.residual, m.status);

@@ -37,7 +37,6 @@ Squares pass(S, Law, SphereContact*, SphereContact*, Coupled) { absent("friction
 Squares pass(S, Law, GeneralGroup*, GeneralGroup*, Coupled) { absent("friction"); }
 Squares pass(S, Law, SphereGroup*, SphereGroup*, Coupled) { absent("friction"); }
 
-void ConeSources::hold_moments(const NearContacts&) { absent("rolling friction"); }
 ConeIslands::ConeIslands(ConeSources& sources, LawUse, const BodyOptions&)
     : mechanisms_(sources.mechanisms), moments_(own_), solver_(Options()) {
   absent("joints");
@@ -67,7 +66,7 @@ Eigen::Vector3d gyroscopic_explicit(M, M, const linalg::Quaternion&, V, double) 
 Eigen::Vector3d gyroscopic_implicit(M, const linalg::Quaternion&, V, double) {
   absent("gyroscopic term");
 }
-void turn_with_momentum(M, M, double, linalg::Quaternion&, Eigen::Vector3d&, FreeSpin&) {
+void turn_with_momentum(M, M, double, linalg::Quaternion&, Eigen::Vector3d&, StepperMemory::Spin&) {
   absent("gyroscopic term");
 }
 }  // namespace detail

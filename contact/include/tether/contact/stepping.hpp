@@ -233,11 +233,12 @@ struct StepCounts {
 /// of the last step. A Stepper of the same scene that is given the bodies and the memory of another
 /// one continues its motion bit by bit.
 struct StepperMemory {
-  /// The momentum of a body without torque, see rotation.hpp, and the state that it belongs to.
+  /// Angular momentum of a body without torque, about its centre (kg m^2/s, world axes). It is kept
+  /// from step to step as long as the body has this angular velocity (rad/s) and orientation:
+  /// rounding of computing it anew is biased and would add up.
   struct Spin {
-    /// Angular momentum about the centre (kg m^2/s) and angular velocity (rad/s), world axes.
-    Eigen::Vector3d momentum, angular_velocity;
-    std::array<double, 4> orientation;  ///< x, y, z, w
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_velocity = momentum;
+    linalg::Quaternion orientation = linalg::Quaternion::Identity();
   };
   long steps = 0;                            ///< taken since the start
   WarmStart contacts, corrections, bounces;  ///< of the contact problems of a step

@@ -84,12 +84,10 @@ double JointFrequency::iterate(const RowsAt& rows_at, const JointRows& rows,
       Eigen::Map<Vector6d, Eigen::Unaligned>(u_.data() + 6 * k) =
           mechanisms.root(list[k]).transpose() * pull_[at(list[k])];
     mechanisms[m].project(u_.data());
-    double square = 0;
-    for (const double x : u_) square += x * x;
-    const double norm = std::sqrt(square);
-    if (!(norm > 0) || !std::isfinite(norm)) continue;
-    most = std::max(most, norm);
-    for (double& x : u_) x /= norm;
+    const double length = norm(u_);
+    if (!(length > 0) || !std::isfinite(length)) continue;
+    most = std::max(most, length);
+    for (double& x : u_) x /= length;
     for (const int body : list) memory_.mode[at(body)].setZero();
     mechanisms.add(m, u_.data(), memory_.mode);
   }

@@ -217,10 +217,7 @@ void StepJoints::put_back(BodySet& bodies, double t) {
     const double move = least_move(bodies, t, 1);
     if (move <= kNoMove * whole || !(move <= 0.5 * before)) return;
     before = move;
-    for (const int i : held_) {
-      bodies.position[at(i)] += change_[at(i)].head<3>();
-      turn_back(bodies, i, change_[at(i)].tail<3>());
-    }
+    move_back(bodies);
   }
 }
 
@@ -235,18 +232,14 @@ void StepJoints::find_impulses(const BodySet& bodies, const StepContacts& contac
   const std::vector<Vector3d>& moments = sources_.moments;
   for (std::size_t c = 0; c < contacts.impulses.size(); ++c) {
     const PointContact& p = contacts.points[c];
-    const Vector3d& x = contacts.impulses[c];
-    if (holds(p.first)) {
-      change_[at(p.first)].head<3>() -= x;
-      change_[at(p.first)].tail<3>() -= p.r1.cross(x);
-    }
-    if (p.second >= 0 && holds(p.second)) {
-      change_[at(p.second)].head<3>() += x;
-      change_[at(p.second)].tail<3>() += p.r2.cross(x);
-    }
-    if (moments.empty()) continue;
-    if (holds(p.first)) change_[at(p.first)].tail<3>() -= moments[c];
-    if (p.second >= 0 && holds(p.second)) change_[at(p.second)].tail<3>() += moments[c];
+    const auto take = [&](int body, const Vector3d& r, double sign) {
+      if (body < 0 || !holds(body)) return;
+      change_[at(body)].head<3>() -= sign * contacts.impulses[c];
+      change_[at(body)].tail<3>() -= sign * r.cross(contacts.impulses[c]);
+      if (!moments.empty()) change_[at(body)].tail<3>() -= sign * moments[c];
+    };
+    take(p.first, p.r1, 1);
+    take(p.second, p.r2, -1);
   }
   const JointRows& laws = laws_.laws.rows();
   for (int k = 0; k < laws.count(); ++k)

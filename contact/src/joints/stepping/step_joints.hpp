@@ -100,7 +100,7 @@ class StepJoints {
   bool is_rounding(const BodySet& bodies) const;
   double size(const BodySet& bodies) const;
   double least_move(const BodySet& bodies, double t, double dt);
-  void turn_back(BodySet& bodies, int body, const Eigen::Vector3d& turn) const;
+  void move_back(BodySet& bodies) const;
   bool project_positions(BodySet& bodies, double t);
   [[noreturn]] void refuse(const BodySet& bodies, double t);
   [[noreturn]] void refuse_rates();

@@ -14,16 +14,6 @@ namespace tether::contact::detail {
 using Eigen::Vector3d;
 using linalg::at;
 
-namespace {
-
-double norm(const std::vector<double>& u) {
-  double sum = 0;
-  for (const double x : u) sum += x * x;
-  return std::sqrt(sum);
-}
-
-}  // namespace
-
 double StepJoints::size(const BodySet& bodies) const {
   double sum = 0;
   for (const int i : held_)
@@ -64,12 +54,17 @@ bool StepJoints::is_rounding(const BodySet& bodies) const {
   return true;
 }
 
-void StepJoints::turn_back(BodySet& bodies, int body, const Vector3d& turn) const {
-  if (turn.isZero(0)) return;
-  RigidBody& motion = bodies.motion[at(body)];
-  linalg::Quaternion& q = bodies.orientation[at(body)];
-  turn_with_velocity(turn, q, motion.angular_velocity);
-  motion.inverse_inertia = turned(bodies.inverse_inertia[at(body)], q);
+// By change_.
+void StepJoints::move_back(BodySet& bodies) const {
+  for (const int i : held_) {
+    bodies.position[at(i)] += change_[at(i)].head<3>();
+    const Vector3d turn = change_[at(i)].tail<3>();
+    if (turn.isZero(0)) continue;
+    RigidBody& motion = bodies.motion[at(i)];
+    linalg::Quaternion& q = bodies.orientation[at(i)];
+    turn_with_velocity(turn, q, motion.angular_velocity);
+    motion.inverse_inertia = turned(bodies.inverse_inertia[at(i)], q);
+  }
 }
 
 bool StepJoints::project_positions(BodySet& bodies, double t) {
@@ -82,10 +77,7 @@ bool StepJoints::project_positions(BodySet& bodies, double t) {
     if (move <= kNoMove * whole) break;
     if (k > 3 && move > 0.5 * before) return move + left_ <= kMet * whole || is_rounding(bodies);
     before = move;
-    for (const int i : held_) {
-      bodies.position[at(i)] += change_[at(i)].head<3>();
-      turn_back(bodies, i, change_[at(i)].tail<3>());
-    }
+    move_back(bodies);
   }
   return left_ <= kMet * whole;
 }

@@ -2,6 +2,7 @@
 // section 3.2). SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -88,28 +89,15 @@ inline void refine_sliding(const LocalBlock& L, const double* gamma, const Wide*
     const Wide t = std::sqrt(z[1] * z[1] + z[2] * z[2]);
     if (!(t > 0)) return;
     const Wide u[2] = {z[1] / t, z[2] / t}, q[2] = {u[0] + gamma[0], u[1] + gamma[1]};
-    const Wide F[3] = {v[0], t - L.mu * z[0], v[1] * q[1] - v[2] * q[0]};
+    const Eigen::Matrix<Wide, 3, 1> F(v[0], t - L.mu * z[0], v[1] * q[1] - v[2] * q[0]);
     const Wide along = (v[1] * u[0] + v[2] * u[1]) / t;  // -d/dz_t of v x z_t/|z_t|, across z_t
-    const Wide J[3][3] = {
-        {L.a, L.c[0], L.c[1]},
-        {-static_cast<Wide>(L.mu), u[0], u[1]},
-        {L.c[0] * q[1] - L.c[1] * q[0], L.T[0] * q[1] - L.T[1] * q[0] - along * u[1],
-         L.T[1] * q[1] - L.T[2] * q[0] + along * u[0]}};
-    Wide minor[3][3];  // transposed cofactors
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) {
-        const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-        minor[c][r] = J[r1][c1] * J[r2][c2] - J[r1][c2] * J[r2][c1];
-      }
-    const Wide det = J[0][0] * minor[0][0] + J[0][1] * minor[1][0] + J[0][2] * minor[2][0];
-    Wide move[3], moved = 0, size = 0;
-    for (int c = 0; c < 3; ++c) {
-      move[c] = -(minor[c][0] * F[0] + minor[c][1] * F[1] + minor[c][2] * F[2]) / det;
-      moved += move[c] * move[c];
-      size += z[c] * z[c];
-    }
-    if (!(moved <= kSmall * size)) return;
-    for (int c = 0; c < 3; ++c) z[c] += move[c];
+    Eigen::Matrix<Wide, 3, 3> J;
+    J << L.a, L.c[0], L.c[1], -static_cast<Wide>(L.mu), u[0], u[1], L.c[0] * q[1] - L.c[1] * q[0],
+        L.T[0] * q[1] - L.T[1] * q[0] - along * u[1], L.T[1] * q[1] - L.T[2] * q[0] + along * u[0];
+    Eigen::Map<Eigen::Matrix<Wide, 3, 1>> to(z);
+    const Eigen::Matrix<Wide, 3, 1> move = -J.inverse() * F;
+    if (!(move.squaredNorm() <= kSmall * to.squaredNorm())) return;
+    to += move;
   }
 }
 

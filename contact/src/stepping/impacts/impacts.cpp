@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "stepping/sub_step.hpp"
+
 namespace tether::contact::detail {
 
 void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
@@ -22,14 +24,13 @@ void Impacts::choose(const NearContacts& near, const BodySet& bodies, double dt,
 }
 
 void Impacts::keep_only_impacts(StepContacts& contacts) {
-  for (std::size_t k = 0; k < list_.size(); ++k) {
-    const auto from = static_cast<std::size_t>(list_[k].contact);  // ascending
-    contacts.points[k] = contacts.points[from];
-    contacts.gaps[k] = contacts.gaps[from];
-    list_[k].contact = static_cast<int>(k);
-  }
-  contacts.points.resize(list_.size());
-  contacts.gaps.resize(list_.size());
+  std::size_t kept = 0;  // contacts of the list ascend
+  keep_contacts(contacts, [&](std::size_t k) {
+    const bool is_impact =
+        kept < list_.size() && static_cast<std::size_t>(list_[kept].contact) == k;
+    if (is_impact) list_[kept].contact = static_cast<int>(kept), ++kept;
+    return is_impact;
+  });
 }
 
 double Impacts::least_speed(const NearContacts& near, const PointContact& c) const {

@@ -47,14 +47,14 @@ class FreeMotion {
   void turn_inertias(BodySet& bodies) const;
 
   /// Spins of the bodies that keep their momentum, in the order of free_long().
-  std::vector<FreeSpin>& spins() { return spins_; }
-  const std::vector<FreeSpin>& spins() const { return spins_; }
+  std::vector<StepperMemory::Spin>& spins() { return spins_; }
+  const std::vector<StepperMemory::Spin>& spins() const { return spins_; }
   const std::vector<int>& free_long() const { return free_long_; }
 
  private:
   std::vector<int> moving_, long_;
   std::vector<int> free_, free_round_, free_long_;  // those that no joint moves
-  std::vector<FreeSpin> spins_;
+  std::vector<StepperMemory::Spin> spins_;
   std::vector<char> may_fall_, falls_;  // bodies
   std::vector<Eigen::Vector3d> weight_only_;
   MovingIslands islands_;

@@ -100,15 +100,15 @@ Vector3d gyroscopic_implicit(const Matrix3d& inertia, const linalg::Quaternion& 
 }
 
 void turn_with_momentum(const Matrix3d& inertia, const Matrix3d& inverse_inertia, double dt,
-                        linalg::Quaternion& q, Vector3d& w, FreeSpin& free) {
+                        linalg::Quaternion& q, Vector3d& w, StepperMemory::Spin& kept) {
   if (w.isZero(0)) return;
-  const bool same = w == free.w && q.coeffs() == free.q.coeffs();
-  if (!same) free.L = spin(inertia, q, w);
-  Vector3d W = inverse_inertia * (q.conjugate() * free.L);
+  const bool same = w == kept.angular_velocity && q.coeffs() == kept.orientation.coeffs();
+  if (!same) kept.momentum = spin(inertia, q, w);
+  Vector3d W = inverse_inertia * (q.conjugate() * kept.momentum);
   turn(inertia, dt, 8, q, W);
-  w = q * (inverse_inertia * (q.conjugate() * free.L));
-  free.w = w;
-  free.q = q;
+  w = q * (inverse_inertia * (q.conjugate() * kept.momentum));
+  kept.angular_velocity = w;
+  kept.orientation = q;
 }
 
 }  // namespace tether::contact::detail

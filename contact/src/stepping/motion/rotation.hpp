@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <tether/linalg/eigen.hpp>
+#include <tether/contact/stepping.hpp>
 
 namespace tether::contact::detail {
 
@@ -31,18 +31,12 @@ Eigen::Vector3d gyroscopic_explicit(const Eigen::Matrix3d& inertia,
 Eigen::Vector3d gyroscopic_implicit(const Eigen::Matrix3d& inertia, const linalg::Quaternion& q,
                                     const Eigen::Vector3d& w, double dt);
 
-/// Angular momentum of a body without torque. It is kept from step to step as long as the state of
-/// the body is unchanged, because rounding of computing it anew is biased and would add up.
-struct FreeSpin {
-  Eigen::Vector3d L = Eigen::Vector3d::Zero(), w = Eigen::Vector3d::Zero();
-  linalg::Quaternion q = linalg::Quaternion::Identity();
-};
-
 /// Turns the body by dt with its angular momentum kept: with body angular velocities W before and
 /// W1 after, q1 = q exp(dt (W + W1) / 2) and I W1 = R1' R I W. Then R1'L - R'L is a rotation about
 /// W + W1, so (W1 - W).I (W1 + W) = 0: the energy is kept, too, whatever dt.
 void turn_with_momentum(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse_inertia,
-                        double dt, linalg::Quaternion& q, Eigen::Vector3d& w, FreeSpin& free);
+                        double dt, linalg::Quaternion& q, Eigen::Vector3d& w,
+                        StepperMemory::Spin& kept);
 /// By dt, with its angular momentum kept or its angular velocity. Inline: who never turns a body
 /// that is not round links nothing of the former.
 inline void turn_freely(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& inverse_inertia,
@@ -52,7 +46,7 @@ inline void turn_freely(const Eigen::Matrix3d& inertia, const Eigen::Matrix3d& i
     q = (exponential(dt * w) * q).normalized();
     return;
   }
-  FreeSpin spin;
+  StepperMemory::Spin spin;
   turn_with_momentum(inertia, inverse_inertia, dt, q, w, spin);
 }
 

@@ -57,20 +57,19 @@ bool ClosedSurface::contains(const Vector3d& p) const {
 
 void ClosedSurface::demand_no_crossing() const {
   const int n = static_cast<int>(triangles_.size());
-  std::vector<std::array<Vector3d, 2>> box;
+  std::vector<Eigen::AlignedBox3d> box(at(n));
   std::vector<int> order(at(n));
   for (int t = 0; t < n; ++t) {
     order[at(t)] = t;
-    box.push_back({corner(t, 0).cwiseMin(corner(t, 1)).cwiseMin(corner(t, 2)),
-                   corner(t, 0).cwiseMax(corner(t, 1)).cwiseMax(corner(t, 2))});
+    for (int k = 0; k < 3; ++k) box[at(t)].extend(corner(t, k));
   }
   std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return box[at(a)][0].x() < box[at(b)][0].x(); });
+            [&](int a, int b) { return box[at(a)].min().x() < box[at(b)].min().x(); });
   for (std::size_t i = 0; i < order.size(); ++i)
     for (std::size_t k = i + 1; k < order.size(); ++k) {
       const auto &a = box[at(order[i])], &b = box[at(order[k])];
-      if (b[0].x() > a[1].x()) break;
-      if ((b[0].array() > a[1].array()).any() || (a[0].array() > b[1].array()).any()) continue;
+      if (b.min().x() > a.max().x()) break;
+      if (!a.intersects(b)) continue;
       if (passes(order[i], order[k]) || passes(order[k], order[i]))
         refuse_mesh("triangles " + std::to_string(std::min(order[i], order[k])) + " and " +
                     std::to_string(std::max(order[i], order[k])) +
@@ -79,14 +78,11 @@ void ClosedSurface::demand_no_crossing() const {
 }
 
 void ClosedSurface::set_points(const std::vector<Vector3d>& points) {
-  Vector3d low = points.front(), high = low;
-  for (const Vector3d& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : points) box.extend(p);
   // A power of two scales without rounding.
-  unit_ = std::exp2(std::ceil(std::log2((high - low).maxCoeff())));
-  middle_ = (low / unit_ + high / unit_) / 2;
+  unit_ = std::exp2(std::ceil(std::log2(box.sizes().maxCoeff())));
+  middle_ = (box.min() / unit_ + box.max() / unit_) / 2;
   number_ = welded(points, points_);
   for (Vector3d& p : points_) p /= unit_;
 }

@@ -17,12 +17,9 @@ using linalg::at;
 namespace {
 
 double extent(const Polyhedron& p) {
-  Vector3d low = p.vertices[0], high = low;
-  for (const Vector3d& v : p.vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-  return (high - low).maxCoeff();
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& v : p.vertices) box.extend(v);
+  return box.sizes().maxCoeff();
 }
 
 // The convex pieces of a polygon in the plane across n that are not in a convex polygon `over`,

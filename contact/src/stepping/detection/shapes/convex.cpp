@@ -44,12 +44,9 @@ class ConvexForm final : public CorneredForm {
   void begin(const Shape& s, ConvexShape& out) const override {
     out.points = &s.points;
     for (const Vector3d& p : s.points) out.middle += p / static_cast<double>(s.points.size());
-    Vector3d low = s.points[0], high = low;
-    for (const Vector3d& p : s.points) {
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-    out.half = 0.5 * (high - low);
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& p : s.points) box.extend(p);
+    out.half = 0.5 * box.sizes();
     out.thickness = out.half.minCoeff();
   }
   Vector3d farthest(const ConvexShape& s, const Vector3d& m, double less) const override {
