@@ -1,10 +1,11 @@
-// Tether: printing of the projection's work counts. SPDX-License-Identifier: BSD-3-Clause
+// Tether: names and work counts of what the projection does. SPDX-License-Identifier: BSD-3-Clause
 #include <iomanip>
 #include <limits>
 #include <ostream>
 #include <tether/ida_projection/statistics.hpp>
 
 #include "host/shortest.hpp"
+#include "watch/report.hpp"
 
 namespace tether::ida_projection {
 
@@ -40,6 +41,32 @@ struct Entry {
   { #name, &S::name }
 constexpr Entry kEntries[] = {TETHER_ENTRIES(TETHER_ENTRY)};
 
+// The name of each status, and what counts it as a failure of a projection.
+struct Outcome {
+  Status status;
+  const char* name;
+  long Statistics::*count = nullptr;
+};
+constexpr Outcome outcomes[] = {
+    {Status::unused, "unused"},
+    {Status::success, "success"},
+    {Status::not_converged, "not converged", &Statistics::not_converged},
+    {Status::move_too_long, "move too long", &Statistics::move_too_long},
+    {Status::inconsistent, "inconsistent constraints", &Statistics::inconsistent},
+    {Status::not_finite, "not finite", &Statistics::not_finite},
+    {Status::callback_recoverable, "callback failed, recoverable",
+     &Statistics::callback_recoverable},
+    {Status::corrector_failed, "corrector failed"},
+    {Status::collapsed, "steps collapsed"},
+    {Status::doubtful, "doubtful"},
+    {Status::callback_fatal, "callback failed", &Statistics::callback_fatal},
+    {Status::late_attach, "attached too late"},
+    {Status::simultaneous_sensitivities, "simultaneous sensitivities"},
+    {Status::never_called, "never called"},
+    {Status::out_of_memory, "out of memory"},
+    {Status::misused, "misused"},
+    {Status::internal_error, "internal error"}};
+
 // The numbers together, in one line. A mean move of a tolerance is as long as an error
 // that IDA's test accepts: constraints that F keeps need less.
 std::string verdict(const Statistics& s) {
@@ -66,6 +93,17 @@ std::string verdict(const Statistics& s) {
 }
 
 }  // namespace
+
+const char* to_string(Status status) {
+  for (const Outcome& outcome : outcomes)
+    if (outcome.status == status) return outcome.name;
+  return "unknown";
+}
+
+void count_failure(Statistics& statistics, Status status) {
+  for (const Outcome& outcome : outcomes)
+    if (outcome.status == status && outcome.count != nullptr) ++(statistics.*outcome.count);
+}
 
 std::string Statistics::table() const {
   PlainText out;
