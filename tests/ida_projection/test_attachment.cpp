@@ -351,7 +351,6 @@ TEST_CASE("calls of a Projection that was moved from are errors") {
   CHECK(refused([&] { (void)first.status(); }));
   CHECK(refused([&] { (void)first.message(); }));
   CHECK(refused([&] { (void)first.statistics(); }));
-  CHECK(refused([&] { (void)first.constraints(); }));
   CHECK(refused([&] { first.reset_statistics(); }));
   CHECK(refused([&] { first.project(0.0, host.y); }));
   CHECK(refused([&] { first.make_consistent(0.0, host.y, host.yp); }));
@@ -407,7 +406,6 @@ TEST_CASE("status and message before the first step") {
   const tp::Projection& projection = host.attach(host.problem.recommended_constraints());
   CHECK(projection.status() == tp::Status::unused);
   CHECK(projection.message().empty());
-  CHECK(projection.constraints().total_count() == 3);
   CHECK(projection.statistics().solver_calls == 0);
   CHECK(std::string(tp::to_string(tp::Status::late_attach)) == "attached too late");
 }

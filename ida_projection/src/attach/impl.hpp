@@ -64,7 +64,6 @@ class Projection::Impl {
   ConsistencyReport make_consistent(double t0, N_Vector yy, N_Vector yp, const Consistency& how);
   ConsistencyReport project(double t, N_Vector yy, N_Vector yp);
   int solve_and_project(double tout, double* tret, N_Vector yret, N_Vector ypret, int itask);
-  const Constraints& constraints() const { return constraints_; }
   Status status();
   const std::string& message();  ///< unchanged by status() and statistics()
   Statistics statistics();

@@ -229,6 +229,5 @@ Statistics Projection::statistics() const { return own(impl_).statistics(); }
 void Projection::reset_statistics() { own(impl_).reset_statistics(); }
 Status Projection::status() const { return own(impl_).status(); }
 const std::string& Projection::message() const { return own(impl_).message(); }
-const Constraints& Projection::constraints() const { return own(impl_).constraints(); }
 
 }  // namespace tether::ida_projection

@@ -57,6 +57,19 @@ static_assert(int(ip::Status::doubtful) == TETHER_DOUBTFUL &&
               int(ip::LongMove::cap) == TETHER_LONG_MOVE_CAP &&
               int(ip::Polished::none) == TETHER_POLISH_NONE);
 
+// A function of C++ that calls one of C with its data. Arguments of C are pointers.
+double* raw(ip::Vector v) { return v.data(); }
+double* raw(ip::Matrix C) { return C.data(); }
+const double* raw(ip::ConstVector y) { return y.data(); }
+template <class Plain>
+Plain raw(Plain argument) {
+  return argument;
+}
+template <class Function>
+auto bound(Function* f, void* user_data) {
+  return [=](double t, auto... arguments) { return f(t, raw(arguments)..., user_data); };
+}
+
 // Rows with a value and a Jacobian made by `jacobian`, which checks its own arguments, go to a set.
 template <class Value, class Jacobian>
 int add_rows(const char* function, tether_constraints* set, int count, Value value, void* user_data,
@@ -72,10 +85,7 @@ int add_rows(const char* function, tether_constraints* set, int count, Value val
     arguments.require(value, "value");
     ip::Constraints rows;
     rows.count = count;
-    if constexpr (std::is_same_v<Value, tether_value_fn>)
-      rows.value = [value, user_data](double t, ip::ConstVector y, ip::Vector g) {
-        return value(t, y.data(), g.data(), user_data);
-      };
+    if constexpr (std::is_same_v<Value, tether_value_fn>) rows.value = bound(value, user_data);
     jacobian(arguments, rows.jacobian);
     set->rows = set->rows + rows;  // a copy: the set stays whole if memory runs out
   });
@@ -91,19 +101,20 @@ int with(const tether_projection* projection, const char* function, Call&& call)
 
 int finish(const ip::ConsistencyReport& found, tether_report* report) {
   if (report != nullptr) {
-    const tether_report r{report->size,
-                          static_cast<int>(found.status),
-                          found.iterations,
-                          found.move,
-                          found.largest_change,
-                          found.changed_component,
-                          found.derivative_change,
-                          found.drift_before,
-                          found.drift_after,
-                          found.residual_before,
-                          found.residual_after,
-                          found.rank,
-                          found.slow_convergence ? 1 : 0};
+    const auto& f = found;
+    const tether_report r = {report->size,
+                             static_cast<int>(f.status),
+                             f.iterations,
+                             f.move,
+                             f.largest_change,
+                             f.changed_component,
+                             f.derivative_change,
+                             f.drift_before,
+                             f.drift_after,
+                             f.residual_before,
+                             f.residual_after,
+                             f.rank,
+                             f.slow_convergence ? 1 : 0};
     std::memcpy(report, &r, report->size);
   }
   if (found) return 0;
@@ -182,10 +193,8 @@ int tether_add_rows(tether_constraints* constraints, int count, tether_value_fn 
                     tether_jacobian_fn jacobian, void* user_data) {
   return add_rows("tether_add_rows", constraints, count, value, user_data,
                   [=](const Arguments&, auto& C_of_rows) {
-                    if (jacobian == nullptr) return;
-                    C_of_rows = ip::DenseJacobian([=](double t, ip::ConstVector y, ip::Matrix C) {
-                      return jacobian(t, y.data(), C.data(), user_data);
-                    });
+                    if (jacobian != nullptr)
+                      C_of_rows = ip::DenseJacobian(bound(jacobian, user_data));
                   });
 }
 
@@ -205,9 +214,7 @@ int tether_add_sparse_rows(tether_constraints* constraints, int count, const int
                     ip::SparseJacobian pattern;
                     pattern.starts.assign(starts, starts + count + 1);
                     pattern.columns.assign(columns, columns + starts[count]);
-                    pattern.fill = [=](double t, ip::ConstVector y, ip::Vector values) {
-                      return entries(t, y.data(), values.data(), user_data);
-                    };
+                    pattern.fill = bound(entries, user_data);
                     C_of_rows = std::move(pattern);
                   });
 }
@@ -218,12 +225,8 @@ int tether_add_gradients(tether_constraints* constraints, int count, tether_vect
                   [=](const Arguments& arguments, auto& C_of_rows) {
                     arguments.require(gradients, "gradients");
                     ip::Gradients both;
-                    both.value = [=](double t, N_Vector y, double* g) {
-                      return value(t, y, g, user_data);
-                    };
-                    both.fill = [=](double t, N_Vector y, N_Vector* rows) {
-                      return gradients(t, y, rows, user_data);
-                    };
+                    both.value = bound(value, user_data);
+                    both.fill = bound(gradients, user_data);
                     C_of_rows = std::move(both);
                   });
 }
@@ -235,13 +238,10 @@ int tether_add_value_and_jacobian(tether_constraints* constraints,
     arguments.require(both, "both");
     ip::Constraints& rows = constraints->rows;
     ip::Constraints& last = rows.joined.empty() ? rows : rows.joined.back();
-    const auto call = [both, user_data](double t, ip::ConstVector y, ip::Vector g, auto C) {
-      return both(t, y.data(), g.data(), C.data(), user_data);
-    };
     if (auto* dense = std::get_if<ip::DenseJacobian>(&last.jacobian))
-      dense->fill_with_value = call;
+      dense->fill_with_value = bound(both, user_data);
     else if (auto* sparse = std::get_if<ip::SparseJacobian>(&last.jacobian))
-      sparse->fill_with_value = call;
+      sparse->fill_with_value = bound(both, user_data);
     else
       arguments.refuse(
           "the rows added last have no Jacobian; it must follow tether_add_rows with one, or "
@@ -344,14 +344,9 @@ int tether_project_sensitivities(tether_projection* projection,
     const tether_sensitivities given = *sensitivities;
     ip::Sensitivities chosen;
     chosen.count = given.count;
-    if (given.derivative != nullptr)
-      chosen.derivative = [given](double t, ip::ConstVector y, int k, ip::Vector g_p) {
-        return given.derivative(t, y.data(), k, g_p.data(), given.user_data);
-      };
+    if (given.derivative != nullptr) chosen.derivative = bound(given.derivative, given.user_data);
     if (given.vector_derivative != nullptr)
-      chosen.vector_derivative = [given](double t, N_Vector y, int k, double* g_p) {
-        return given.vector_derivative(t, y, k, g_p, given.user_data);
-      };
+      chosen.vector_derivative = bound(given.vector_derivative, given.user_data);
     chosen.parameters = given.parameters;
     const int count = given.count > 0 ? given.count : 0;
     if (given.scales != nullptr) chosen.scales.assign(given.scales, given.scales + count);
@@ -394,7 +389,7 @@ int tether_get_statistic(const tether_projection* projection, const char* name, 
     const double found = own.statistics().number(name);
     if (std::isnan(found))
       arguments.refuse("name = \"" + std::string(name) + "\", must be one of " +
-                       ip::Statistics::csv_header());
+                       ip::Statistics::names());
     *value = found;
   };
   return with(projection, "tether_get_statistic", call);

@@ -21,12 +21,6 @@ struct Entry {
   constexpr Entry(const char* its_name, long S::*of) : name(its_name), count(of) {}
   constexpr Entry(const char* its_name, double S::*of) : name(its_name), size(of) {}
   double value(const S& s) const { return count ? static_cast<double>(s.*count) : s.*size; }
-  void write(std::ostream& out, const S& s) const {
-    if (count)
-      out << s.*count;
-    else
-      out << std::setprecision(6) << std::scientific << s.*size << std::defaultfloat;
-  }
 };
 #define TETHER_ENTRIES(of)                                                                        \
   of(solver_calls), of(steps_without_plugin), of(projections), of(skipped), of(iterations),       \
@@ -111,31 +105,24 @@ std::string Statistics::table() const {
   for (const Entry& entry : kEntries) {
     if (entry.value(*this) == 0) continue;
     out << std::left << std::setw(24) << entry.name << " = ";
-    entry.write(out, *this);
-    out << '\n';
+    if (entry.count)
+      out << this->*entry.count << '\n';
+    else
+      out << std::setprecision(6) << std::scientific << this->*entry.size << '\n';
   }
   return out.str();
 }
 
-std::string Statistics::csv_header() {
+std::string Statistics::names() {
   std::string line;
   for (const Entry& entry : kEntries) line += (line.empty() ? "" : ",") + std::string(entry.name);
   return line;
 }
 
-double Statistics::number(const std::string& column) const {
+double Statistics::number(const std::string& name) const {
   for (const Entry& entry : kEntries)
-    if (column == entry.name) return entry.value(*this);
+    if (name == entry.name) return entry.value(*this);
   return std::numeric_limits<double>::quiet_NaN();
-}
-
-std::string Statistics::csv_row() const {
-  PlainText out;
-  for (const Entry& entry : kEntries) {
-    if (&entry != kEntries) out << ',';
-    entry.write(out, *this);
-  }
-  return out.str();
 }
 
 std::ostream& operator<<(std::ostream& out, const Statistics& statistics) {

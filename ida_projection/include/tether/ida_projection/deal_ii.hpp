@@ -111,26 +111,6 @@ Constraints constraints(const Rows<VectorType>& rows) {
   return c;
 }
 
-/// The caller's hooks of `ida`, put back at the end.
-template <class VectorType>
-class Hooks {
- public:
-  explicit Hooks(::dealii::SUNDIALS::IDA<VectorType>& ida)
-      : output_step(ida.output_step), should_restart(ida.solver_should_restart), ida_(ida) {}
-  ~Hooks() {
-    ida_.output_step = output_step;
-    ida_.solver_should_restart = should_restart;
-  }
-  Hooks(const Hooks&) = delete;
-  Hooks& operator=(const Hooks&) = delete;
-
-  const decltype(::dealii::SUNDIALS::IDA<VectorType>::output_step) output_step;
-  const decltype(::dealii::SUNDIALS::IDA<VectorType>::solver_should_restart) should_restart;
-
- private:
-  ::dealii::SUNDIALS::IDA<VectorType>& ida_;
-};
-
 }  // namespace detail
 
 /// Instead of ida.solve_dae(solution, solution_dot): every step is on the rows. Every output, which
@@ -150,7 +130,13 @@ Run solve_dae(::dealii::SUNDIALS::IDA<VectorType>& ida, const Rows<VectorType>& 
   if (SUNContext_Create(nullptr, &context) != 0) throw std::bad_alloc();
   const std::unique_ptr<SUNContext, void (*)(SUNContext*)> own(
       &context, [](SUNContext* c) { SUNContext_Free(c); });
-  const detail::Hooks<VectorType> hooks(ida);
+  const auto output_step = ida.output_step;  // of the caller's
+  const auto should_restart = ida.solver_should_restart;
+  const auto put_back = [&](const void*) {
+    ida.output_step = output_step;
+    ida.solver_should_restart = should_restart;
+  };
+  const std::unique_ptr<const void, decltype(put_back)> at_end(&ida, put_back);
   bool restarted = true;
   double last = 0;
 
@@ -180,12 +166,12 @@ Run solve_dae(::dealii::SUNDIALS::IDA<VectorType>& ida, const Rows<VectorType>& 
       attach();
       last = t;
     }
-    if (hooks.output_step) hooks.output_step(t, y, yp, step);
+    if (output_step) output_step(t, y, yp, step);
   };
   ida.solver_should_restart = [&](double t, VectorType& y, VectorType& yp) {
     if (!restarted) check(t);
-    const bool restart = hooks.should_restart && hooks.should_restart(t, y, yp);
-    if (restart) restarted = true;
+    const bool restart = should_restart && should_restart(t, y, yp);
+    restarted = restarted || restart;
     return restart;
   };
 

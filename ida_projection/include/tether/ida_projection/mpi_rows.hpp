@@ -57,7 +57,6 @@ class GhostExchange {
     sent_.resize(copied_.size());
   }
 
-  long long first() const { return first_; }  ///< global number of this rank's first unknown
   /// Global numbers of the unknowns that its ghosts copy, in the order of the ghosts.
   const std::vector<long long>& ids() const { return ids_; }
 

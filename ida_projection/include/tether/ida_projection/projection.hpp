@@ -136,11 +136,10 @@ class [[nodiscard]] Projection {
   /// sensitivities; std::invalid_argument for a UserProjection.
   ConsistencyReport project_gradient(double t, N_Vector yy, N_Vector v);
 
-  Statistics statistics() const;           ///< since the start, or the last reset
-  void reset_statistics();                 ///< all to 0
-  Status status() const;                   ///< of the last call by IDA, or of the last call above
-  const std::string& message() const;      ///< what to do about it; empty when all is well
-  const Constraints& constraints() const;  ///< those attached
+  Statistics statistics() const;       ///< since the start, or the last reset
+  void reset_statistics();             ///< all to 0
+  Status status() const;               ///< of the last call by IDA, or of the last call above
+  const std::string& message() const;  ///< what to do about it; empty when all is well
 
   class TETHER_HIDDEN Impl;  // the decorator; see src/
 

@@ -54,10 +54,9 @@ struct Statistics {
   }
   /// A verdict of one line, then two columns: each quantity that is not zero.
   std::string table() const;
-  static std::string csv_header();  ///< names of all quantities, separated by commas
-  std::string csv_row() const;      ///< their values, in the same order
-  /// The number in that column of csv_header(); NaN if there is none.
-  double number(const std::string& column) const;
+  static std::string names();  ///< of all quantities, separated by commas
+  /// The quantity of this name; NaN if there is none.
+  double number(const std::string& name) const;
 };
 
 /// Writes table().
