@@ -51,11 +51,6 @@ void InstantScribe::flush() {
   sheet_.put(out);
 }
 
-void InstantScribe::set_places(double time, const std::vector<BodyState>& states) {
-  bodies_.time = time;
-  for (const std::size_t b : scene_.moving()) bodies_.put(static_cast<int>(b), states[b]);
-}
-
 void InstantScribe::put_impact(double time, const std::vector<BodyState>& before,
                                const std::vector<BodyState>& after,
                                const std::vector<ContactState>& contacts,
@@ -153,26 +148,6 @@ void InstantScribe::put_pushes(std::string& out) {
       Line(out, "push") << body << Vector3d(x * unit.force) << Vector3d(x * unit.torque)
                         << "capstan friction";
     });
-  }
-}
-
-Vector3d InstantScribe::centre(int body) const {
-  return body < 0 ? Vector3d(Vector3d::Zero()) : engine_.bodies()[at(body)].position;
-}
-
-Vector3d InstantScribe::surface_velocity(int body, const Vector3d& point) const {
-  const auto& surface = scene_.bodies[at(body)].surface;
-  if (!surface) return Vector3d::Zero();
-  const linalg::Quaternion& q = engine_.bodies()[at(body)].orientation;
-  return q * surface->velocity + (q * surface->angular_velocity).cross(point - centre(body));
-}
-
-void InstantScribe::put_contacts(std::string& out) const {
-  for (const ContactState& c : engine_.contacts()) {
-    Vector3d belts = surface_velocity(c.first, c.point) - surface_velocity(c.second, c.point);
-    belts -= c.normal.dot(belts) * c.normal;
-    Line(out, "contact") << c.first << c.second << c.point << c.point << c.normal << c.gap << 0.0
-                         << belts << c.force << c.moment;
   }
 }
 

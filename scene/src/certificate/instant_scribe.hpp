@@ -31,11 +31,28 @@ class InstantScribe final : public Source {
 
  private:
   void put_pushes(std::string& out);
-  void put_contacts(std::string& out) const;
+  void put_contacts(std::string& out) const {
+    for (const ContactState& c : engine_.contacts()) {
+      Vector3d belts = surface_velocity(c.first, c.point) - surface_velocity(c.second, c.point);
+      belts -= c.normal.dot(belts) * c.normal;
+      Line(out, "contact") << c.first << c.second << c.point << c.point << c.normal << c.gap << 0.0
+                           << belts << c.force << c.moment;
+    }
+  }
   void put_reactions(double time, const Eigen::VectorXd& momenta, std::string& out);
-  void set_places(double time, const std::vector<BodyState>& states);
-  Vector3d surface_velocity(int body, const Vector3d& point) const;
-  Vector3d centre(int body) const;
+  void set_places(double time, const std::vector<BodyState>& states) {
+    bodies_.time = time;
+    for (const std::size_t b : scene_.moving()) bodies_.put(static_cast<int>(b), states[b]);
+  }
+  Vector3d surface_velocity(int body, const Vector3d& point) const {
+    const auto& surface = scene_.bodies[at(body)].surface;
+    if (!surface) return Vector3d::Zero();
+    const linalg::Quaternion& q = engine_.bodies()[at(body)].orientation;
+    return q * surface->velocity + (q * surface->angular_velocity).cross(point - centre(body));
+  }
+  Vector3d centre(int body) const {
+    return body < 0 ? Vector3d(Vector3d::Zero()) : engine_.bodies()[at(body)].position;
+  }
 
   const Scene scene_;
   const Engine& engine_;

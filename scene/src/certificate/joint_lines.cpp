@@ -116,12 +116,6 @@ std::vector<JointLines::Unit> JointLines::units(const mechanics::Bodies& bodies,
   return out;
 }
 
-std::vector<JointForce> JointLines::reactions(const mechanics::Bodies& bodies, double time,
-                                              const std::vector<double>& multipliers) {
-  rows_.set_time(time);
-  return reactions_.find(rows_, bodies, multipliers.data());
-}
-
 void JointLines::put_pulls(const mechanics::Bodies& bodies, double time,
                            const std::vector<JointForce>& forces, std::string& out) {
   std::vector<std::vector<Unit>> of(forces.size());

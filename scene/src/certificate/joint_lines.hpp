@@ -23,7 +23,10 @@ class JointLines {
   std::vector<Unit> units(const mechanics::Bodies& bodies, double time);
   /// Reactions by the multipliers of the engine's rows.
   std::vector<JointForce> reactions(const mechanics::Bodies& bodies, double time,
-                                    const std::vector<double>& multipliers);
+                                    const std::vector<double>& multipliers) {
+    rows_.set_time(time);
+    return reactions_.find(rows_, bodies, multipliers.data());
+  }
   /// The lines `pull` of these, joint by joint.
   void put_pulls(const mechanics::Bodies& bodies, double time,
                  const std::vector<JointForce>& forces, std::string& out);

@@ -68,32 +68,6 @@ Sheet::Sheet(const Scene& scene) {
   put(out);
 }
 
-void Sheet::open(const std::string& file) {
-  file_.emplace(file, 0);
-  file_->put(std::exchange(waiting_, {}));
-}
-
-void Sheet::put(std::string_view lines) {
-  lines_ += static_cast<long>(std::count(lines.begin(), lines.end(), '\n'));
-  if (file_)
-    file_->put(lines);
-  else
-    waiting_ += lines;
-}
-
-void Sheet::keep() {
-  flush();
-  file_->keep();
-}
-
-void Sheet::end() {
-  keep();
-  std::string out;
-  Line(out, "end") << static_cast<double>(lines_);
-  put(out);
-  file_->keep();
-}
-
 void Sheet::begin(const Scene& scene, const char* engine, Source& source) {
   flush();
   source_ = &source;

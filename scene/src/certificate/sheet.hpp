@@ -60,11 +60,29 @@ class Sheet {
   explicit Sheet(const Scene& scene);
 
   /// Throws std::runtime_error, as put() and end() do from then on.
-  void open(const std::string& file);
-  void put(std::string_view lines);
-  void keep();
+  void open(const std::string& file) {
+    file_.emplace(file, 0);
+    file_->put(std::exchange(waiting_, {}));
+  }
+  void put(std::string_view lines) {
+    lines_ += static_cast<long>(std::count(lines.begin(), lines.end(), '\n'));
+    if (file_)
+      file_->put(lines);
+    else
+      waiting_ += lines;
+  }
+  void keep() {
+    flush();
+    file_->keep();
+  }
   /// Writes the last line, without which a certificate is cut.
-  void end();
+  void end() {
+    keep();
+    std::string out;
+    Line(out, "end") << static_cast<double>(lines_);
+    put(out);
+    file_->keep();
+  }
   const std::string& name() const { return file_->name(); }
 
   /// Lets the engine write its lines so far.

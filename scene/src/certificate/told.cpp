@@ -71,15 +71,6 @@ Reader::Reader(const std::string& file) : in_(file, std::ios::binary), buffer_(k
     if (next_line() != each) refuse("it is no certificate of format 1");
 }
 
-// Valid until the next one; without data at the end of the file.
-std::string_view Reader::next_line() {
-  ++line_;
-  in_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
-  if (in_.gcount() == 0) return {};
-  if (!in_ || in_.eof()) refuse("it is cut, or longer than any");
-  return {buffer_.data(), static_cast<std::size_t>(in_.gcount()) - 1};
-}
-
 bool Reader::next(Record& out) {
   static const std::map<std::string, Form> forms = read_forms();
   const std::string_view line = next_line();

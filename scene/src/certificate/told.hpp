@@ -49,7 +49,14 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& what) const;
-  std::string_view next_line();
+  // Valid until the next one; without data at the end of the file.
+  std::string_view next_line() {
+    ++line_;
+    in_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+    if (in_.gcount() == 0) return {};
+    if (!in_ || in_.eof()) refuse("it is cut, or longer than any");
+    return {buffer_.data(), static_cast<std::size_t>(in_.gcount()) - 1};
+  }
 
   std::ifstream in_;
   std::vector<char> buffer_;  // of a line

@@ -214,13 +214,35 @@ void share_tensions(const std::vector<Grip>& rings, double loaded, const Force& 
 class CapstanSlip {
  public:
   /// `bodies`: at t = 0.
-  CapstanSlip(const Spring& spring, std::size_t number, const Capstan& law, const Bodies& bodies);
+  CapstanSlip(const Spring& spring, std::size_t number, const Capstan& law, const Bodies& bodies)
+      : item_(spring, number, bodies), law_(law) {
+    axis_ = direction_in(item_.frame(bodies, at(law_.ring)), law_.axis);
+    for (const CablePoint& each : item_.points)
+      if (bodies.moves(each.body)) moving_.push_back(each.body);
+    sort_unique(moving_);
+  }
 
   int cable() const { return static_cast<int>(item_.index); }  ///< of the scene's springs
   /// y' is rate() less this.
   double wanted() const { return -item_.winch; }
-  Grip grip(const Bodies& bodies) const;
-  double rate(const Bodies& bodies) const;
+  // |u - v| / |u + v| is the tangent of half the angle between the pieces.
+  Grip grip(const Bodies& bodies) const {
+    double wrap = law_.wrap.value_or(0);
+    if (!law_.wrap) {
+      const Vector3d u = item_.piece(bodies, at(law_.ring) - 1).along,
+                     v = item_.piece(bodies, at(law_.ring)).along;
+      wrap = 2 * std::atan2((u - v).norm(), (u + v).norm());
+    }
+    return {cable(), CableTension(item_, bodies).tension, std::tanh(0.5 * law_.friction * wrap)};
+  }
+  double rate(const Bodies& bodies) const {
+    double sum = 0;
+    each_load(bodies, [&](int body, const Wrench<double>& unit) {
+      const Frame<double>& f = bodies.frames[at(body)];
+      sum += unit.force.dot(f.v) + unit.torque.dot(f.W);
+    });
+    return sum;
+  }
   /// The rate of rate() without accelerations of the bodies.
   double rest(const Bodies& bodies) const;
   /// The loads of x = 1: f(body, wrench) once for each body that moves.

@@ -44,8 +44,6 @@ double graze_tolerance(double tolerance, double speed) {
 
 constexpr long kMostAtOneTime = 300;
 
-using linalg::at;
-
 // The first steps of a bounce are of order 1: some ten times (h / T)^2 is their error in its length
 // T. A way of less than kLeastWay (m in the units of the model) is lost in rounding.
 constexpr double kFlightError = 0.003, kLeastWay = 1e-15;
@@ -131,10 +129,6 @@ std::vector<int> Driver::touching(int always) const {
     if (i == always || closed || near) out.push_back(i);
   }
   return out;
-}
-
-bool Driver::are_one(int contact, int other) const {
-  return model_.are_one(contact, other, kBesideBorder * bands().gap(contact));
 }
 
 // Features of faces, edges and corners that lie on each other: one of those that are one contact,
@@ -227,15 +221,6 @@ bool Driver::repeat_phase() {
   return true;
 }
 
-// No event lies in between, and no more steps than a phase has: what says otherwise never was a
-// state.
-bool Driver::arrive(double t) {
-  const long events = counts_.events;
-  const auto is_over = [&] { return counts_.events > events || phase_->counts().steps >= kAnchor; };
-  advance(t, is_over);
-  return time_ == t && counts_.events == events;
-}
-
 bool Driver::Memory::is_sound() const {
   bool sound = y.allFinite() && time >= 0;
   for (const double x : {time, kept_energy}) sound = sound && std::isfinite(x);
@@ -250,18 +235,6 @@ bool Driver::Memory::is_sound() const {
   for (const long count : {at_one_time, events, impacts})
     sound = sound && count >= 0 && count <= binary::kMostCounted;
   return sound;
-}
-
-// Fails if the steps since the last event are too short for the time that is left: steps that cover
-// 1e-12 of it come to no end, at a microsecond each in some thousand years.
-void Driver::check_pace(double t) const {
-  const long steps = paced_.steps + phase_->counts().steps;
-  const double way = paced_.way + phase_->step_end();
-  if (steps < 100000 || !(way < 1e-12 * (t - time_))) return;
-  fail(
-      fmt::format("the last {} steps are {:.3g} s together, and {:.3g} s are left: a motion too "
-                  "fast for its length of time",
-                  steps, way * model_.time_unit(), (t - time_) * model_.time_unit()));
 }
 
 // Bodies that rattle without end cost all of their rows at each event. Two minutes of work, and at
@@ -312,34 +285,6 @@ Driver::Driver(Model& model, const DriverOptions& options, const Memory& memory)
   start_phase();
 }
 
-VectorXd Driver::state() {
-  VectorXd y = start_.y;
-  // A run that gives up within an event has no phase there yet.
-  const double since = time_ - start_.time;
-  if (since > 0 && phase_->step_end() > 0)
-    phase_->projected_at(std::min(std::max(since, phase_->step_begin()), phase_->step_end()), y);
-  model_.set(time_, y.data());
-  return y;
-}
-
-VectorXd Driver::state_with_forces() {
-  const VectorXd y = state();
-  VectorXd rate(motion_.size());
-  motion_.rate(time_, y.data(), rate.data());
-  return y;
-}
-
-// The direction in which a contact slides, for the instant when its slip vanishes.
-void Driver::turn_slips() {
-  for (std::size_t k = 0; k < motion_.closed().size(); ++k) {
-    const int i = motion_.closed()[k];
-    if (motion_.modes()[at(i)].mode != Mode::slide) continue;
-    const VectorXd s = motion_.slip(static_cast<int>(k));
-    // The direction of less is that of errors.
-    if (s.norm() > 10 * bands().slip(i)) motion_.turn(i, s.normalized());
-  }
-}
-
 void Driver::handle(const Zero& zero) {
   paced_ = {};
   const double now = phase_->start() + zero.time;
@@ -371,11 +316,6 @@ void Driver::handle(const Zero& zero) {
   begin_phase();
 }
 
-EventKind Driver::slip_of(int contact, bool begins) const {
-  if (model_.law(contact).is_moment()) return begins ? EventKind::roll : EventKind::roll_stop;
-  return begins ? EventKind::slip : EventKind::stop;
-}
-
 // Records the changes of mode of contacts that share their forces.
 void Driver::record_changes(const std::vector<ContactMode>& before,
                             const std::vector<ContactMode>& after, double lag) {
@@ -393,12 +333,6 @@ void Driver::fail(const std::string& what) const {
   throw SimulationError(
       fmt::format("t = {:.12g} s: {}. Try another [event] tolerance, or the stepping engine",
                   model_.time_unit() * time_, what));
-}
-
-Counts Driver::counts() const {
-  Counts all = counts_;
-  if (phase_) all += phase_->counts();
-  return all;
 }
 
 void Driver::begin_phase() {
@@ -429,14 +363,6 @@ std::string Driver::contradiction() const {
         "one has {:.3g} m. A smaller tolerance tells them apart",
         unit * band, motion_.closed().size(), unit * gap);
   return text;
-}
-
-// Removes the normal velocities, less than their bands, that contacts have when they close.
-void Driver::settle_velocities() {
-  const double energy = model_.energy();
-  motion_.settle_velocities(start_.time, start_.y);
-  const double lost = energy - model_.energy();
-  if (!events_.empty() && events_.back().time == start_.time) events_.back().lost += lost;
 }
 
 // Everything from (start_.time, start_.y), the modes and the energy that is kept: whoever has these

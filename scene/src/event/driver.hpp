@@ -8,6 +8,8 @@
 //                   the state onto the new constraints, a new phase
 #pragma once
 
+#include <fmt/format.h>
+
 #include "event/phase/friction_solve.hpp"
 #include "event/phase/motion.hpp"
 #include "event/phase/phase.hpp"
@@ -92,14 +94,40 @@ class Driver {
   void advance(double t, const std::function<bool()>& interrupted = {},
                const std::function<double()>& excess = {});
   /// From the start of the present phase to a time in it; false: it is not in it, or too far.
-  bool arrive(double t);
+  // No event lies in between, and no more steps than a phase has: what says otherwise never was a
+  // state.
+  bool arrive(double t) {
+    const long events = counts_.events;
+    const auto is_over = [&] {
+      return counts_.events > events || phase_->counts().steps >= kAnchor;
+    };
+    advance(t, is_over);
+    return time_ == t && counts_.events == events;
+  }
   double time() const { return time_; }
   /// The state there: q, u, work of forces without potential.
-  VectorXd state();
+  VectorXd state() {
+    VectorXd y = start_.y;
+    // A run that gives up within an event has no phase there yet.
+    const double since = time_ - start_.time;
+    if (since > 0 && phase_->step_end() > 0)
+      phase_->projected_at(std::min(std::max(since, phase_->step_begin()), phase_->step_end()), y);
+    model_.set(time_, y.data());
+    return y;
+  }
   /// The same, and the motion has the accelerations and forces there.
-  VectorXd state_with_forces();
+  VectorXd state_with_forces() {
+    const VectorXd y = state();
+    VectorXd rate(motion_.size());
+    motion_.rate(time_, y.data(), rate.data());
+    return y;
+  }
   const std::vector<EventRecord>& events() const { return events_; }
-  Counts counts() const;
+  Counts counts() const {
+    Counts all = counts_;
+    if (phase_) all += phase_->counts();
+    return all;
+  }
   const Motion& motion() const { return motion_; }
   Motion& motion() { return motion_; }
 
@@ -111,13 +139,29 @@ class Driver {
   void close_contacts(const StartState& start);
   void begin_phase();
   std::string contradiction() const;
-  void settle_velocities();
+  // Removes the normal velocities, less than their bands, that contacts have when they close.
+  void settle_velocities() {
+    const double energy = model_.energy();
+    motion_.settle_velocities(start_.time, start_.y);
+    const double lost = energy - model_.energy();
+    if (!events_.empty() && events_.back().time == start_.time) events_.back().lost += lost;
+  }
   void start_phase(double most = 1);  // tolerance of IDA
   bool repeat_phase();
   void find_excess(const std::function<double()>& excess);
   void handle(const Zero& zero);
   void anchor();
-  void check_pace(double t) const;
+  // Fails if the steps since the last event are too short for the time that is left: steps that
+  // cover 1e-12 of it come to no end, at a microsecond each in some thousand years.
+  void check_pace(double t) const {
+    const long steps = paced_.steps + phase_->counts().steps;
+    const double way = paced_.way + phase_->step_end();
+    if (steps < 100000 || !(way < 1e-12 * (t - time_))) return;
+    fail(
+        fmt::format("the last {} steps are {:.3g} s together, and {:.3g} s are left: a motion too "
+                    "fast for its length of time",
+                    steps, way * model_.time_unit(), (t - time_) * model_.time_unit()));
+  }
   void check_storm();
   void collide(const std::vector<int>& near, EventKind otherwise, int contact);
   std::vector<int> struck(const std::vector<int>& near, int first);
@@ -125,7 +169,13 @@ class Driver {
   struct Impact;
   void refuse_blocked(const ContactRows& rows, const Impact& impact);
   Impact expect(const ContactRows& rows, const VectorXd& before, bool plastic);
-  double change_velocities(const VectorXd& change);
+  // Returns the energy that is lost.
+  double change_velocities(const VectorXd& change) {
+    const double energy = model_.energy();
+    u() += change;
+    set_model();
+    return energy - model_.energy();
+  }
   void record_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
                       const VectorXd& after, const VectorXd& x, double lost);
   bool has_accumulated(int contact, double approach, double& rest) const;
@@ -144,17 +194,36 @@ class Driver {
   bool lifts(const ContactRows& rows, int k, const AccelerationSolution& answer) const;
   ContactMode begins(const ContactRows& rows, int k, const AccelerationSolution& answer,
                      const Left& left) const;
-  bool leaves_its_feature(int contact);
+  // It is at the border of its face or edge, and on its way out; another contact takes its place.
+  bool leaves_its_feature(int contact) {
+    const double band = bands().gap(contact);
+    return model_.margin(contact) <= band &&
+           motion_.margin_rate(start_.time, start_.y, contact) < -bands().approach(contact);
+  }
   void jam(const ContactRows& rows, const VectorXd& velocities);
   std::vector<int> touching(int always) const;
-  bool are_one(int contact, int other) const;
+  bool are_one(int contact, int other) const {
+    return model_.are_one(contact, other, kBesideBorder * bands().gap(contact));
+  }
   std::vector<int> without_doubles(const std::vector<int>& contacts) const;
   /// Contacts, and the moments that they hold, behind them.
   std::vector<int> with_moments(std::vector<int> contacts) const;
   double slowest_turn();
   double longest_first_step(const std::vector<bool>& leaving);
-  void turn_slips();
-  EventKind slip_of(int contact, bool begins) const;
+  // The direction in which a contact slides, for the instant when its slip vanishes.
+  void turn_slips() {
+    for (std::size_t k = 0; k < motion_.closed().size(); ++k) {
+      const int i = motion_.closed()[k];
+      if (motion_.modes()[at(i)].mode != Mode::slide) continue;
+      const VectorXd s = motion_.slip(static_cast<int>(k));
+      // The direction of less is that of errors.
+      if (s.norm() > 10 * bands().slip(i)) motion_.turn(i, s.normalized());
+    }
+  }
+  EventKind slip_of(int contact, bool begins) const {
+    if (model_.law(contact).is_moment()) return begins ? EventKind::roll : EventKind::roll_stop;
+    return begins ? EventKind::slip : EventKind::stop;
+  }
   void record(EventKind kind, int contact, double before = 0, double after = 0, double lost = 0) {
     events_.push_back({start_.time, kind, contact, before, after, lost});
   }

@@ -20,8 +20,6 @@ namespace {
 
 constexpr double kAgree = 0.05;  // of ratios
 
-using linalg::at;
-
 constexpr int kMostRounds = 2000;  // of one instant
 
 }  // namespace
@@ -179,14 +177,6 @@ void Driver::strike(const std::vector<int>& set, bool plastic) {
   record_impacts(rows, impact, before, rows.velocities(u), answer.x, lost);
 }
 
-// Returns the energy that is lost.
-double Driver::change_velocities(const VectorXd& change) {
-  const double energy = model_.energy();
-  u() += change;
-  set_model();
-  return energy - model_.energy();
-}
-
 void Driver::record_impacts(const ContactRows& rows, const Impact& impact, const VectorXd& before,
                             const VectorXd& after, const VectorXd& x, double lost) {
   double largest = 0;
@@ -308,13 +298,6 @@ ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationSol
                     mode.direction.dot(motion_.modes()[at(i)].direction) > 0.5;
   if (!(model_.holding(i) > 0) || !(sticks || same)) return mode;
   return {Mode::stick, sticks ? VectorXd() : mode.direction};
-}
-
-// It is at the border of its face or edge, and on its way out; another contact takes its place.
-bool Driver::leaves_its_feature(int contact) {
-  const double band = bands().gap(contact);
-  return model_.margin(contact) <= band &&
-         motion_.margin_rate(start_.time, start_.y, contact) < -bands().approach(contact);
 }
 
 // Forces without bound stop the slip in no time: the impulses that keep the contacts from closing

@@ -436,18 +436,6 @@ class Drafting {
 
 }  // namespace
 
-int Draft::add(Body body, std::string comment) {
-  scene.bodies.push_back(std::move(body));
-  body_comments.push_back(std::move(comment));
-  return static_cast<int>(scene.bodies.size()) - 1;
-}
-
-int Draft::add(Joint joint, std::string comment) {
-  scene.joints.push_back(std::move(joint));
-  joint_comments.push_back(std::move(comment));
-  return static_cast<int>(scene.joints.size()) - 1;
-}
-
 Draft make_draft(const Model& model, const std::vector<Part>& parts, const ImportOptions& options,
                  Remarks& remarks) {
   return Drafting(model, parts, options, remarks).take();

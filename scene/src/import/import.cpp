@@ -109,14 +109,6 @@ Imported import_robot(std::string_view text, const std::string& file,
   }
 }
 
-void Remarks::add(const std::string& what, const std::string& name) {
-  const auto [found, is_new] = index_.emplace(what, lines_.size());
-  if (is_new) lines_.push_back({what, {}, 0});
-  Line& line = lines_[found->second];
-  ++line.count;
-  if (!name.empty() && line.names.size() < kMostListed) line.names.push_back(name);
-}
-
 std::vector<std::string> Remarks::lines() const {
   std::vector<std::string> out;
   for (const Line& line : lines_) {

@@ -35,7 +35,12 @@ struct Settings {
   /// One of quat, axisangle, euler, xyaxes, zaxis; none: the identity.
   Quaterniond orientation(Tag& tag) const;
   /// Two numbers, where the attribute `limited` does not leave them out; empty: there are none.
-  std::vector<double> range(Tag& tag, const char* key, const char* limited) const;
+  std::vector<double> range(Tag& tag, const char* key, const char* limited) const {
+    const std::string word = tag.word(limited, "auto", {"true", "false", "auto"});
+    std::vector<double> range = tag.numbers(key, 2, 2);
+    if (word == "false" || (word == "auto" && !autolimits)) range.clear();
+    return range;
+  }
 };
 
 /// The limits that two numbers are; without numbers none. Reports where they are in the wrong
@@ -55,7 +60,12 @@ Matter read_geom(const Node& node, const std::string& class_name, const Settings
 
 /// Names that an MJCF file gives, by kind. An attribute that names nothing of its kind is wrong.
 struct Names {
-  explicit Names(Model& model);
+  explicit Names(Model& model) : bodies{"world"} {
+    for (Link& link : model.links) {
+      if (!link.scenery) bodies.insert(link.name);
+      for (LinkJoint& joint : link.joints) joints.emplace(joint.name, &joint);
+    }
+  }
   LinkJoint* joint(Tag& tag, const char* key) const;  ///< null: there is none
   void tendon(Tag& tag, const char* key) const;
   void body(Tag& tag, const char* key) const;

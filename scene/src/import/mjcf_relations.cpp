@@ -176,13 +176,6 @@ void take_name(const Node& node, std::set<std::string>& names, Problems& problem
 
 }  // namespace
 
-Names::Names(Model& model) : bodies{"world"} {
-  for (Link& link : model.links) {
-    if (!link.scenery) bodies.insert(link.name);
-    for (LinkJoint& joint : link.joints) joints.emplace(joint.name, &joint);
-  }
-}
-
 LinkJoint* Names::joint(Tag& tag, const char* key) const {
   const auto found = joints.find(tag.text(key));
   must_exist(found != joints.end(), tag, key, "joint");

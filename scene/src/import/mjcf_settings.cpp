@@ -159,13 +159,6 @@ const Attributes* Settings::defaults(const Node& node, const std::string& otherw
   return of == found->second.end() ? nullptr : &of->second;
 }
 
-std::vector<double> Settings::range(Tag& tag, const char* key, const char* limited) const {
-  const std::string word = tag.word(limited, "auto", {"true", "false", "auto"});
-  std::vector<double> range = tag.numbers(key, 2, 2);
-  if (word == "false" || (word == "auto" && !autolimits)) range.clear();
-  return range;
-}
-
 std::optional<std::pair<double, double>> limits_of(Tag& tag, const char* key,
                                                    const std::vector<double>& range) {
   if (range.empty()) return {};

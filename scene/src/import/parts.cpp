@@ -338,12 +338,6 @@ void Matter::add(const Matter& part, const Isometry3d& place) {
   touch->join(*part.touch);
 }
 
-double Part::inertia_about_joints() const {
-  double out = inertia.cwiseAbs().maxCoeff();
-  for (const PlacedJoint& each : joints) out += mass * (each.at - pose * centre).squaredNorm();
-  return out;
-}
-
 bool has_wide_limits(const LinkJoint& joint) {
   return joint.kind == JointKind::hinge && joint.limits &&
          !(joint.limits->second - joint.limits->first < 2 * linalg::kPi);

@@ -24,7 +24,11 @@ struct Part : Matter {
 
   bool fixed() const { return joints.empty(); }
   /// At most, kg m^2.
-  double inertia_about_joints() const;
+  double inertia_about_joints() const {
+    double out = inertia.cwiseAbs().maxCoeff();
+    for (const PlacedJoint& each : joints) out += mass * (each.at - pose * centre).squaredNorm();
+    return out;
+  }
 };
 
 /// Small bodies have this part of the mass or inertia of the one that they carry.
@@ -44,8 +48,16 @@ struct Draft {
   std::vector<std::string> body_comments, joint_comments;
 
   /// Their numbers.
-  int add(Body body, std::string comment);
-  int add(Joint joint, std::string comment);
+  int add(Body body, std::string comment) {
+    scene.bodies.push_back(std::move(body));
+    body_comments.push_back(std::move(comment));
+    return static_cast<int>(scene.bodies.size()) - 1;
+  }
+  int add(Joint joint, std::string comment) {
+    scene.joints.push_back(std::move(joint));
+    joint_comments.push_back(std::move(comment));
+    return static_cast<int>(scene.joints.size()) - 1;
+  }
 };
 
 /// The force of an actuator is (1, length, speed) . this, before its bounds.

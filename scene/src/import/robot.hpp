@@ -22,7 +22,13 @@ using linalg::at;
 /// One line for each kind of thing, with the names of all that it concerns.
 class Remarks {
  public:
-  void add(const std::string& what, const std::string& name = "");
+  void add(const std::string& what, const std::string& name = "") {
+    const auto [found, is_new] = index_.emplace(what, lines_.size());
+    if (is_new) lines_.push_back({what, {}, 0});
+    Line& line = lines_[found->second];
+    ++line.count;
+    if (!name.empty() && line.names.size() < kMostListed) line.names.push_back(name);
+  }
   /// "what: a, b, c" or "what (3)", in the order of their first appearance.
   std::vector<std::string> lines() const;
 

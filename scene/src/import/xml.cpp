@@ -227,28 +227,6 @@ std::string shown(const std::string& text) {
   return problem.message().substr(2);
 }
 
-const char* Tag::find(std::string_view key) {
-  keys_read_.emplace(key);
-  if (const char* const own = node_.Attribute(std::string(key).c_str())) return own;
-  if (defaults_ == nullptr) return nullptr;
-  const auto found = defaults_->find(key);
-  return found == defaults_->end() ? nullptr : found->second.c_str();
-}
-
-std::string Tag::text(std::string_view key, std::string_view otherwise) {
-  const char* const found = find(key);
-  return std::string(found != nullptr ? found : otherwise);
-}
-
-std::string Tag::word(std::string_view key, std::string_view otherwise,
-                      std::initializer_list<std::string_view> words) {
-  const std::string found = text(key, otherwise);
-  if (!contains(words, found))
-    wrong(key, fmt::format("must be {} or {}", fmt::join(words.begin(), words.end() - 1, ", "),
-                           *(words.end() - 1)));
-  return found;
-}
-
 std::string Tag::name(std::string_view key, std::string_view allowed) {
   const char* const found = find(key);
   if (found == nullptr) {
@@ -258,41 +236,6 @@ std::string Tag::name(std::string_view key, std::string_view allowed) {
   if (*found == '\0' || !files::is_name(found))
     wrong(key, std::string("must be a name: it ") + files::kName);
   return found;
-}
-
-double Tag::number(std::string_view key, double otherwise) {
-  const std::vector<double> one = numbers(key, 1, 1);
-  return one.empty() ? otherwise : one.front();
-}
-
-double Tag::positive(std::string_view key, double otherwise) {
-  const double value = number(key, otherwise);
-  if (value > 0) return value;
-  wrong(key, "must be a number > 0");
-  return otherwise;
-}
-
-double Tag::not_negative(std::string_view key, double otherwise) {
-  const double value = number(key, otherwise);
-  if (value >= 0) return value;
-  wrong(key, "must be a number >= 0");
-  return otherwise;
-}
-
-bool Tag::flag(std::string_view key, bool otherwise) {
-  return word(key, otherwise ? "true" : "false", {"true", "false"}) == "true";
-}
-
-Vector3d Tag::vector(std::string_view key, const Vector3d& otherwise) {
-  const std::vector<double> v = numbers(key, 3, 3);
-  return v.empty() ? otherwise : Vector3d(v[0], v[1], v[2]);
-}
-
-Vector3d Tag::direction(std::string_view key, const Vector3d& otherwise) {
-  const Vector3d v = vector(key, otherwise);
-  if (v.stableNorm() > 0) return v.stableNormalized();
-  wrong(key, "must be a direction, not zero");
-  return otherwise;
 }
 
 std::vector<double> Tag::numbers(std::string_view key, std::size_t least, std::size_t most) {
@@ -316,10 +259,6 @@ void Tag::wrong(std::string_view key, std::string allowed) {
   const char* const found = find(key);
   problems_.add(line(), path(node_) + ": " + std::string(key),
                 found != nullptr ? shortened(found) : "", std::move(allowed));
-}
-
-void Tag::missing(std::string_view key, std::string allowed) {
-  problems_.add(node_, key, "is missing: " + allowed);
 }
 
 void Tag::finish(Remarks& remarks, const std::set<std::string, std::less<>>& no_matter) {

@@ -88,25 +88,67 @@ class Tag {
   Tag(const Node& node, Problems& problems, const Attributes* defaults = nullptr)
       : node_(node), problems_(problems), defaults_(defaults) {}
 
-  const char* find(std::string_view key);  ///< null: it is not there
+  /// null: it is not there
+  const char* find(std::string_view key) {
+    keys_read_.emplace(key);
+    if (const char* const own = node_.Attribute(std::string(key).c_str())) return own;
+    if (defaults_ == nullptr) return nullptr;
+    const auto found = defaults_->find(key);
+    return found == defaults_->end() ? nullptr : found->second.c_str();
+  }
   bool has(std::string_view key) { return find(key) != nullptr; }
-  std::string text(std::string_view key, std::string_view otherwise = "");
+  std::string text(std::string_view key, std::string_view otherwise = "") {
+    const char* const found = find(key);
+    return std::string(found != nullptr ? found : otherwise);
+  }
   /// One of these words; another one is reported and returned.
   std::string word(std::string_view key, std::string_view otherwise,
-                   std::initializer_list<std::string_view> words);
+                   std::initializer_list<std::string_view> words) {
+    const std::string found = text(key, otherwise);
+    if (!contains(words, found))
+      wrong(key, fmt::format("must be {} or {}", fmt::join(words.begin(), words.end() - 1, ", "),
+                             *(words.end() - 1)));
+    return found;
+  }
   std::string name(std::string_view key, std::string_view allowed);  ///< must be there
-  double number(std::string_view key, double otherwise);
-  double positive(std::string_view key, double otherwise);
-  double not_negative(std::string_view key, double otherwise);
-  bool flag(std::string_view key, bool otherwise);  ///< true or false
-  Vector3d vector(std::string_view key, const Vector3d& otherwise);
+  double number(std::string_view key, double otherwise) {
+    const std::vector<double> one = numbers(key, 1, 1);
+    return one.empty() ? otherwise : one.front();
+  }
+  double positive(std::string_view key, double otherwise) {
+    const double value = number(key, otherwise);
+    if (value > 0) return value;
+    wrong(key, "must be a number > 0");
+    return otherwise;
+  }
+  double not_negative(std::string_view key, double otherwise) {
+    const double value = number(key, otherwise);
+    if (value >= 0) return value;
+    wrong(key, "must be a number >= 0");
+    return otherwise;
+  }
+  /// true or false
+  bool flag(std::string_view key, bool otherwise) {
+    return word(key, otherwise ? "true" : "false", {"true", "false"}) == "true";
+  }
+  Vector3d vector(std::string_view key, const Vector3d& otherwise) {
+    const std::vector<double> v = numbers(key, 3, 3);
+    return v.empty() ? otherwise : Vector3d(v[0], v[1], v[2]);
+  }
   /// A direction of any length but zero; returned with length 1.
-  Vector3d direction(std::string_view key, const Vector3d& otherwise);
+  Vector3d direction(std::string_view key, const Vector3d& otherwise) {
+    const Vector3d v = vector(key, otherwise);
+    if (v.stableNorm() > 0) return v.stableNormalized();
+    wrong(key, "must be a direction, not zero");
+    return otherwise;
+  }
   /// `least` to `most` finite numbers; empty if absent or wrong.
   std::vector<double> numbers(std::string_view key, std::size_t least, std::size_t most);
 
   void wrong(std::string_view key, std::string allowed);
-  void missing(std::string_view key, std::string allowed);
+  void missing(std::string_view key, std::string allowed) {
+    problems_.add(node_, key, "is missing: " + allowed);
+  }
   /// Says which attributes nobody has asked for, beside those of `no_matter`.
   void finish(Remarks& remarks, const std::set<std::string, std::less<>>& no_matter = {});
 

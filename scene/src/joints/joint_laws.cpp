@@ -30,8 +30,6 @@ Frame<double> second_at_closing(const Joint& joint, const Frame<double>& at_star
   return frame_at(joint.closed->position, joint.closed->orientation.toRotationMatrix());
 }
 
-Vector3d Coordinate::place(const Bodies& bodies) const { return point<0>(A(bodies), at_first_).x; }
-
 double Coordinate::rest(const Bodies& bodies) const {
   if (what_ == MotionOf::angle)
     return B(bodies).W.cross(direction(bodies)).dot(A(bodies).W - B(bodies).W);
@@ -83,15 +81,6 @@ JointLaws::JointLaws(const Scene& scene, const Bodies& bodies) {
         slips_.emplace_back(scene.springs[i], i, each, bodies);
 }
 
-// The turn of a hinge whose angle is nearest to the middle between its limits.
-double JointLaws::value(const Item& item, const Bodies& bodies) const {
-  const double value = item.coordinate.value(bodies);
-  if (!item.law.limits || item.coordinate.what() != MotionOf::angle) return value;
-  const double middle = 0.5 * (item.law.limits->lower + item.law.limits->upper);
-  const double turn = 2 * linalg::kPi;
-  return value + turn * std::round((middle - value) / turn);
-}
-
 // Its components stand one after the other.
 void JointLaws::measure_ball(std::size_t component, const Bodies& bodies,
                              mechanics::JointLawList& out) const {
@@ -124,19 +113,6 @@ void JointLaws::add(const Bodies& bodies, contact::JointLaws& out) {
   }
 }
 
-void JointLaws::grip(const Bodies& bodies, std::vector<effects::Grip>& out) const {
-  out.clear();
-  for (const effects::CapstanSlip& each : slips_) out.push_back(each.grip(bodies));
-}
-
-bool JointLaws::shares_tension(int law) const {
-  const effects::CapstanSlip* of = slip(law);
-  const auto same = [&](const effects::CapstanSlip& each) {
-    return &each != of && each.cable() == of->cable();
-  };
-  return of != nullptr && any_of(slips_, same);
-}
-
 bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
                               contact::JointLaws& laws) const {
   const int first = count() - static_cast<int>(slips_.size());
@@ -157,16 +133,6 @@ bool JointLaws::change_bounds(const std::vector<double>& impulses, double dt,
   return change > kSameFigure * largest;
 }
 
-// One law after the other: a term goes to the law added last.
-void JointLaws::place(int item, double sign, const Bodies& bodies, contact::JointLaws& out) {
-  placed_.push_back({item, sign, out[out.count() - 1].is_sprung()});
-  each_load(count() - 1, bodies, [&](int body, const Wrench<double>& on) {
-    contact::Vector6d G;
-    G << on.force, on.torque;
-    out.on(body, G);
-  });
-}
-
 void JointLaws::add_force(int law, const Bodies& bodies, double force, Forces& out) const {
   if (const effects::CapstanSlip* of = slip(law)) {
     out.springs[at(of->cable())].tension += force;
@@ -178,12 +144,6 @@ void JointLaws::add_force(int law, const Bodies& bodies, double force, Forces& o
   const bool angle = coordinate(law).what() == MotionOf::angle;
   (angle ? on.moment : on.force) += x * coordinate(law).direction(bodies);
   on.drive += x;
-}
-
-void JointLaws::add_forces(const Bodies& bodies, const std::vector<double>& impulses, double dt,
-                           Forces& out) const {
-  for (std::size_t i = 0; dt > 0 && i < impulses.size() && i < placed_.size(); ++i)
-    if (!placed_[i].sprung) add_force(static_cast<int>(i), bodies, impulses[i] / dt, out);
 }
 
 }  // namespace tether::scene::joints

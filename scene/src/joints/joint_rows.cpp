@@ -83,14 +83,6 @@ void JointRows::place_bodies(const Bodies& bodies) {
   std::apply([&](auto&... kinds) { (place(kinds), ...); }, rows_);
 }
 
-void JointRows::set_time(double t) {
-  for (std::size_t i = 0; i < motions_.size(); ++i) now_[i] = evaluate(motions_[i], t);
-}
-
-void JointRows::hold_motions() {
-  for (Now& each : now_) each.s1 = each.s2 = 0.0;
-}
-
 void JointRows::gradient(const Bodies& bodies, Eigen::MatrixXd& G) const {
   G.setZero(count_, 6 * bodies.moving);
   each([&](const auto& row) {
@@ -101,14 +93,6 @@ void JointRows::gradient(const Bodies& bodies, Eigen::MatrixXd& G) const {
                      G.block<1, 3>(row.row + i, 6 * slot + 3) += torque.transpose();
                    });
   });
-}
-
-const std::string& JointRows::joint_of(int row) const {
-  int joint = 0;
-  each([&](const auto& kind) {
-    if (kind.row <= row && row < kind.row + kind.count) joint = kind.joint;
-  });
-  return name(joint);
 }
 
 RowBuilder::RowBuilder(JointRows& rows, const Joint& joint, const Row& bodies,
@@ -122,65 +106,6 @@ RowBuilder::RowBuilder(JointRows& rows, const Joint& joint, const Row& bodies,
       z_(joint.axis.norm() > 0 ? Vector3d(joint.axis.normalized()) : Vector3d(Vector3d::UnitZ())),
       x_(z_.unitOrthogonal()),
       y_(z_.cross(x_)) {}
-
-template <class Kind>
-void RowBuilder::place(Kind row) {
-  static_cast<Row&>(row) = bodies_;
-  row.row = rows_.count_;
-  rows_.count_ += row.count;
-  std::get<std::vector<Kind>>(rows_.rows_).push_back(row);
-}
-
-void RowBuilder::coincide() {
-  Coincidence row;
-  row.at_first = point_in(A_, joint_.at);
-  row.at_second = point_in(B_, joint_.at);
-  place(row);
-}
-
-void RowBuilder::right_angle(const Vector3d& u, const Vector3d& v) {
-  RightAngle row;
-  row.of_first = direction_in(A_, u);
-  row.of_second = direction_in(B_, v);
-  place(row);
-}
-
-void RowBuilder::same_attitude() {
-  right_angle(x_, y_);
-  right_angle(y_, z_);
-  right_angle(z_, x_);
-}
-
-void RowBuilder::prescribed_angle() {
-  Angle row;
-  row.of_first = direction_in(A_, x_);
-  row.zero = direction_in(B_, x_);
-  row.ahead = direction_in(B_, y_);
-  row.now = now_;
-  place(row);
-}
-
-void RowBuilder::plane(const Vector3d& normal, const Now* motion) {
-  Plane row;
-  row.at_first = point_in(A_, joint_.at);
-  row.at_second = point_in(B_, joint_.at);
-  row.normal = direction_in(B_, normal);
-  row.now = motion;
-  place(row);
-}
-
-void RowBuilder::distance(double length) {
-  Distance row;
-  row.at_first = point_in(A_, joint_.at);
-  row.at_second = point_in(B_, joint_.at_second);
-  row.length = length;
-  row.now = now_;
-  place(row);
-}
-
-Reactions::Reactions(const Scene& scene, const Bodies& bodies) {
-  for (const Joint& joint : scene.joints) joints_.emplace_back(joint, bodies);
-}
 
 std::vector<JointForce> Reactions::find(const JointRows& rows, const Bodies& bodies,
                                         const double* multipliers) const {

@@ -37,15 +37,6 @@ std::vector<BodyState> placed_states(const Scene& scene) {
   return out;
 }
 
-void Bodies::put(int body, const BodyState& state) {
-  Frame<double>& f = frames[at(body)];
-  f.x = state.position;
-  f.R = state.orientation.toRotationMatrix();
-  f.v = state.velocity;
-  f.W = state.angular_velocity;
-  w[at(body)] = f.R.transpose() * f.W;
-}
-
 BodyState state_of(const contact::BodySet& set, int body) {
   return {set.position[at(body)], set.orientation[at(body)], set.motion[at(body)].velocity,
           set.motion[at(body)].angular_velocity};
@@ -56,51 +47,6 @@ void put_state(const BodyState& state, int body, contact::BodySet& set) {
   set.orientation[at(body)] = state.orientation;
   set.motion[at(body)].velocity = state.velocity;
   set.motion[at(body)].angular_velocity = state.angular_velocity;
-}
-
-SteppedBodies::SteppedBodies(const Scene& scene)
-    : bodies_(weighed_bodies(scene)), before_(bodies_), loads_(at(bodies_.moving)) {}
-
-void SteppedBodies::begin(const contact::BodySet& set, const Vector3d& weight) {
-  for (int b = 0; b < set.size(); ++b) {
-    if (!bodies_.moves(b)) continue;
-    before_.put(b, state_of(set, b));
-    before_.frames[at(b)].v -= weight;
-  }
-}
-
-void SteppedBodies::damp(int body, double dt, const Vector3d& force, const Vector3d& torque) {
-  push(body, dt, force, torque);
-  if (!bodies_.moves(body)) return;
-  Frame<double>& f = before_.frames[at(body)];
-  f.v += dt * motion(body).inverse_mass * force;
-  f.W += dt * (motion(body).inverse_inertia * torque);
-}
-
-void SteppedBodies::read(contact::BodySet& set) {
-  set_ = &set;
-  copy(set);
-}
-
-void SteppedBodies::copy(const contact::BodySet& set) {
-  for (int b = 0; b < set.size(); ++b)
-    if (bodies_.moves(b)) bodies_.put(b, state_of(set, b));
-}
-
-void SteppedBodies::set_velocity(int body, const Vector3d& velocity,
-                                 const Vector3d& angular_velocity) {
-  contact::RigidBody& motion = set_->motion[at(body)];
-  Frame<double>& f = bodies_.frames[at(body)];
-  motion.velocity = f.v = velocity;
-  motion.angular_velocity = f.W = angular_velocity;
-  bodies_.w[at(body)] = f.R.transpose() * f.W;
-}
-
-void SteppedBodies::push(int body, double dt, const Vector3d& force, const Vector3d& torque) {
-  if (!bodies_.moves(body)) return;
-  const contact::RigidBody& motion = set_->motion[at(body)];
-  set_velocity(body, motion.velocity + dt * motion.inverse_mass * force,
-               motion.angular_velocity + dt * (motion.inverse_inertia * torque));
 }
 
 void Force::step(SteppedBodies& stepped, double dt) const {

@@ -32,7 +32,14 @@ struct Bodies {
   /// Index of a body of the scene, where -1 is the world.
   int index(int body) const { return body < 0 ? world() : body; }
   /// Gives a body a state, without accelerations.
-  void put(int body, const BodyState& state);
+  void put(int body, const BodyState& state) {
+    Frame<double>& f = frames[at(body)];
+    f.x = state.position;
+    f.R = state.orientation.toRotationMatrix();
+    f.v = state.velocity;
+    f.W = state.angular_velocity;
+    w[at(body)] = f.R.transpose() * f.W;
+  }
 };
 
 /// Body `body` of the contact library's set, to read and to set.
@@ -149,7 +156,8 @@ class JacobianBlocks {
 /// A view of a BodySet with the same bodies. Impulses change the velocities of both.
 class SteppedBodies {
  public:
-  explicit SteppedBodies(const Scene& scene);
+  explicit SteppedBodies(const Scene& scene)
+      : bodies_(weighed_bodies(scene)), before_(bodies_), loads_(at(bodies_.moving)) {}
 
   const Bodies& bodies() const { return bodies_; }
   /// A step from `time` on.
@@ -158,20 +166,49 @@ class SteppedBodies {
     bodies_.span = span;
   }
   /// Before the first force of a step, to whose velocities its weight has added `weight`.
-  void begin(const contact::BodySet& set, const Vector3d& weight);
+  void begin(const contact::BodySet& set, const Vector3d& weight) {
+    for (int b = 0; b < set.size(); ++b) {
+      if (!bodies_.moves(b)) continue;
+      before_.put(b, state_of(set, b));
+      before_.frames[at(b)].v -= weight;
+    }
+  }
   /// The bodies with the velocities at the start of the step and what damp() has changed since.
   const Bodies& before_forces() const { return before_; }
-  void damp(int body, double dt, const Vector3d& force, const Vector3d& torque);
+  void damp(int body, double dt, const Vector3d& force, const Vector3d& torque) {
+    push(body, dt, force, torque);
+    if (!bodies_.moves(body)) return;
+    Frame<double>& f = before_.frames[at(body)];
+    f.v += dt * motion(body).inverse_mass * force;
+    f.W += dt * (motion(body).inverse_inertia * torque);
+  }
 
   /// Takes over positions and velocities; later calls change `set`.
-  void read(contact::BodySet& set);
+  void read(contact::BodySet& set) {
+    set_ = &set;
+    copy(set);
+  }
   /// The same, for what changes nothing.
-  void copy(const contact::BodySet& set);
+  void copy(const contact::BodySet& set) {
+    for (int b = 0; b < set.size(); ++b)
+      if (bodies_.moves(b)) bodies_.put(b, state_of(set, b));
+  }
 
   const contact::RigidBody& motion(int body) const { return set_->motion[at(body)]; }
-  void set_velocity(int body, const Vector3d& velocity, const Vector3d& angular_velocity);
+  void set_velocity(int body, const Vector3d& velocity, const Vector3d& angular_velocity) {
+    contact::RigidBody& motion = set_->motion[at(body)];
+    Frame<double>& f = bodies_.frames[at(body)];
+    motion.velocity = f.v = velocity;
+    motion.angular_velocity = f.W = angular_velocity;
+    bodies_.w[at(body)] = f.R.transpose() * f.W;
+  }
   /// v += dt force / m, w += dt I^-1 torque; world axes. Fixed bodies stay.
-  void push(int body, double dt, const Vector3d& force, const Vector3d& torque);
+  void push(int body, double dt, const Vector3d& force, const Vector3d& torque) {
+    if (!bodies_.moves(body)) return;
+    const contact::RigidBody& motion = set_->motion[at(body)];
+    set_velocity(body, motion.velocity + dt * motion.inverse_mass * force,
+                 motion.angular_velocity + dt * (motion.inverse_inertia * torque));
+  }
 
   /// Room for the sum of the forces on each moving body.
   std::vector<Load6>& loads() { return loads_; }

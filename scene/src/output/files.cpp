@@ -188,12 +188,6 @@ RowFile::~RowFile() {
   }
 }
 
-void RowFile::put(std::string_view rows) {
-  waiting_ += rows;
-  // Who watches a table sees it grow.
-  if (waiting_.size() >= 4096) flush();
-}
-
 void RowFile::flush() {
   const std::size_t done = write_bytes(descriptor_, waiting_);
   if (done < waiting_.size()) {

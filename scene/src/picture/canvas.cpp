@@ -164,18 +164,7 @@ void Canvas::hatch(const std::vector<Vector2d>& points) {
   drawn_ += fmt::format("<polygon points=\"{}\" fill=\"url(#hatch)\"/>\n", corners(points));
 }
 
-void Canvas::begin_clip(const Box& box) {
-  drawn_ += fmt::format(
-      "<clipPath id=\"clip{0}\"><rect x=\"{1:.1f}\" y=\"{2:.1f}\" width=\"{3:.1f}\" "
-      "height=\"{4:.1f}\"/></clipPath>\n<g clip-path=\"url(#clip{0})\">\n",
-      clips_++, box.left, box.top, box.right - box.left, box.bottom - box.top);
-}
-
 void Canvas::end_clip() { drawn_ += "</g>\n"; }
-
-void Canvas::begin_note(const std::string& text) {
-  drawn_ += fmt::format("<g><title>{}</title>\n", markup_text(text));
-}
 
 void Canvas::avoid(const Vector2d& from, const Vector2d& to) {
   if (!drawable({from, to})) return;

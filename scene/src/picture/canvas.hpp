@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <fmt/format.h>
 #include <string>
 #include <vector>
 
@@ -68,10 +69,17 @@ class Canvas {
   /// Lines over a polygon: what is held fast.
   void hatch(const std::vector<Vector2d>& points);
   /// Drawings between the two calls are seen inside of the box only.
-  void begin_clip(const Box& box);
+  void begin_clip(const Box& box) {
+    drawn_ += fmt::format(
+        "<clipPath id=\"clip{0}\"><rect x=\"{1:.1f}\" y=\"{2:.1f}\" width=\"{3:.1f}\" "
+        "height=\"{4:.1f}\"/></clipPath>\n<g clip-path=\"url(#clip{0})\">\n",
+        clips_++, box.left, box.top, box.right - box.left, box.bottom - box.top);
+  }
   void end_clip();
   /// Drawings between the two calls tell the text where they are pointed at.
-  void begin_note(const std::string& text);
+  void begin_note(const std::string& text) {
+    drawn_ += fmt::format("<g><title>{}</title>\n", markup_text(text));
+  }
   void end_note() { end_clip(); }
 
   /// Texts keep off the box.

@@ -20,32 +20,6 @@ std::optional<double> positive(const std::string& text) {
 
 std::string all_of(std::istream& in) { return files::read_stream(in, kLargestScene); }
 
-[[noreturn]] void refuse(const std::string& word, const std::string& why) {
-  throw std::invalid_argument(fmt::format("--vary {}: {}", word, why));
-}
-
-std::vector<double> range(const std::string& word, const std::vector<std::string>& parts) {
-  const bool logarithmic = parts.size() == 4 && parts[3] == "log";
-  const std::optional<double> from = finite_number(parts[0]), to = finite_number(parts[1]),
-                              count = finite_number(parts[2]);
-  if ((parts.size() == 4 && !logarithmic) || !from || !to || !count)
-    refuse(word, "a range is FROM:TO:COUNT or FROM:TO:COUNT:log, e.g. 0.1:0.5:9");
-  if (*count != std::floor(*count) || *count < 2 || *count > static_cast<double>(kMostListed))
-    refuse(word, fmt::format("COUNT must be a whole number from 2 to {}", kMostListed));
-  if (logarithmic && !(*from > 0 && *to > 0)) refuse(word, "both ends of log must be > 0");
-  const int last = static_cast<int>(*count) - 1;
-  std::vector<double> values;
-  for (int k = 0; k <= last; ++k) {
-    const double share = static_cast<double>(k) / last;
-    // Values have 15 digits, so that 0.1:0.5:9 has 0.15 and not the number beside it.
-    const double value =
-        logarithmic ? *from * std::pow(*to / *from, share) : *from * (1 - share) + *to * share;
-    values.push_back(finite_number(fmt::format("{:.15g}", value)).value_or(value));
-  }
-  values.back() = *to;
-  return values;
-}
-
 }  // namespace
 
 void check_outputs(const Output& files, const std::vector<std::string>& inputs, bool force) {
@@ -112,40 +86,6 @@ Scene read_scene_argument(const std::string& file) {
   const SceneText scene = read_scene_text(file);
   Scene out = parse_scene(scene.text, scene.name);
   out.file.clear();  // no name of a file that an output could have
-  return out;
-}
-
-void parse_paths(const SceneText& scene, const std::vector<Setting>& settings) {
-  try {
-    parse_scene_with(scene.text, scene.name, settings);
-  } catch (const SceneError& e) {
-    // An unknown key is a path that leads to nothing; values are judged one by one.
-    for (const Problem& problem : e.problems())
-      for (const Setting& each : settings) {
-        const std::string key = each.path.substr(each.path.rfind('.') + 1);
-        const std::size_t at = problem.field.size() - std::min(problem.field.size(), key.size());
-        if (problem.allowed.rfind("unknown key", 0) == 0 && problem.field.substr(at) == key)
-          throw std::invalid_argument(fmt::format("\"{}\": {}", each.path, problem.allowed));
-      }
-  }
-}
-
-VariedNumber read_varied(const std::string& word) {
-  const std::size_t equals = word.find('=');
-  if (equals == std::string::npos || equals == 0)
-    refuse(word, "must be PATH=VALUES, e.g. pair.friction=0.1:0.5:9");
-  VariedNumber out;
-  out.path = word.substr(0, equals);
-  const std::string values = word.substr(equals + 1);
-  if (const auto parts = files::split(values, ':'); parts.size() == 3 || parts.size() == 4) {
-    out.values = range(word, parts);
-    return out;
-  }
-  for (const std::string& each : files::split(values, ',')) {
-    const std::optional<double> value = finite_number(each);
-    if (!value) refuse(word, fmt::format("\"{}\" is not a finite number", each));
-    out.values.push_back(*value);
-  }
   return out;
 }
 

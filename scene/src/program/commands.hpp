@@ -68,18 +68,6 @@ SceneText read_scene_text(const std::string& file);
 /// The scene of a file or, of "-", of the standard input.
 Scene read_scene_argument(const std::string& file);
 
-/// Throws std::invalid_argument if a path leads to nothing. Values that are wrong are no matter.
-void parse_paths(const SceneText& scene, const std::vector<Setting>& settings);
-
-/// PATH=FROM:TO:COUNT[:log] or PATH=VALUE,VALUE,...
-struct VariedNumber {
-  std::string path;
-  std::vector<double> values;
-};
-
-/// std::invalid_argument naming the word otherwise.
-VariedNumber read_varied(const std::string& word);
-
 void add_check_command(CLI::App& app, int* status);
 void add_contact_command(CLI::App& app, int* status);
 void add_cost_command(CLI::App& app, int* status);

@@ -4,14 +4,6 @@
 
 namespace tether::scene::smooth {
 
-void System::sum_forces(Stopwatch* watch) {
-  clear(loads_);
-  for (std::size_t i = 0; i < forces_.size(); ++i) {
-    forces_[i]->add(bodies_.all(), loads_);
-    if (watch) watch->lap(i);
-  }
-}
-
 void System::add_multipliers(const double* lambda) {
   const Bodies& bodies = bodies_.all();
   rows_.each([&](const auto& row) {
@@ -21,13 +13,6 @@ void System::add_multipliers(const double* lambda) {
     put_wrench(bodies, row.first, a, loads_);
     put_wrench(bodies, row.second, b, loads_);
   });
-}
-
-void System::torques_to_body_axes() {
-  for (int k = 0; k < moving(); ++k) {
-    Load6& load = loads_[at(k)];
-    load.torque_body += bodies_.frame(k).R.transpose() * load.torque_world;
-  }
 }
 
 double System::power(const double* lambda) const {
@@ -65,16 +50,6 @@ void System::add_motion_residual(const double* y, const double* yp, double* r) c
           inertia.inertia * Map3(p + kSpin) - loads_[at(k)].torque_body;
     }
   }
-}
-
-void System::add_row_residual(const double* y, const double* yp, double* r) {
-  const double* lambda = y + first_multiplier();
-  double* out = r + first_multiplier();
-  bodies_.set_accelerations(yp);
-  rows_.values<2>(bodies_.all(), out);
-  // In the place of a row that depends on others: its multiplier is 0.
-  for (int i = 0; i < rows(); ++i)
-    if (!in_use_.carries_multiplier(i)) out[i] = dynamics_.size_of_row()[i] * lambda[i];
 }
 
 void System::residual(double t, const double* y, const double* yp, double* r, Stopwatch* watch) {

@@ -25,37 +25,6 @@ System::System(const Scene& scene, const Units& units)
     acceleration_jacobian_ = std::make_unique<AccelerationJacobian>(terms_, dynamics_);
 }
 
-Eigen::VectorXd System::id() const {
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(size_);
-  out.head(first_multiplier()).setOnes();
-  return out;
-}
-
-// Multipliers follow the state; where rows depend on each other they are known to round-off / eps
-// only, and at a singular position they have a pole. Newton's test is left to the state.
-Eigen::VectorXd System::absolute_tolerances(double tolerance) const {
-  Eigen::VectorXd out = Eigen::VectorXd::Constant(size_, 1e10 * tolerance);
-  out.head(first_multiplier()).setConstant(tolerance);
-  return out;
-}
-
-Eigen::VectorXd System::start_state() const {
-  Eigen::VectorXd y = Eigen::VectorXd::Zero(size_);
-  std::copy(bodies_.start().begin(), bodies_.start().end(), y.data());
-  return y;
-}
-
-void System::update(double t, const double* y) {
-  rows_.set_time(t);
-  bodies_.set_time(t);
-  bodies_.set_state(y);
-}
-
-void System::choose_rows(double t, const double* y, double tolerance) {
-  update(t, y);
-  in_use_.choose(tolerance);
-}
-
 std::vector<std::string> System::dependent_joints(double t, const double* y) {
   constexpr double kNear = 1e-3;  // of rows of unit length
   std::vector<std::string> names;
@@ -70,11 +39,6 @@ std::vector<std::string> System::dependent_joints(double t, const double* y) {
     if (!contains(names, name)) names.push_back(name);
   }
   return names;
-}
-
-void System::keep_invariants_of(double t, const Eigen::VectorXd& y) {
-  update(t, y.data());
-  invariants_.keep(t, y.data());
 }
 
 void System::complete(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp) {
@@ -97,24 +61,6 @@ void System::complete(double t, Eigen::VectorXd& y, Eigen::VectorXd& yp) {
   if (form_ != Formulation::index0) y.segment(first_multiplier(), rows()) = lambda;
 }
 
-std::vector<std::string> System::effect_names() const {
-  std::vector<std::string> names;
-  for (const auto& force : forces_) names.emplace_back(force->name());
-  names.emplace_back("joints");
-  names.emplace_back("equations of motion");
-  return names;
-}
-
-Diagnostics System::diagnostics(double t, const double* y) {
-  Diagnostics d;
-  d.drift = drift(t, y);
-  for (const auto& force : forces_) d.potential_energy += force->potential(bodies_.all());
-  d.kinetic_energy = invariants_.energy() - d.potential_energy;
-  d.momentum = bodies_.momentum();
-  d.angular_momentum = bodies_.angular_momentum();
-  return d;
-}
-
 // Forces follow from the state: those among the unknowns are held to no tolerance.
 scene::Forces System::forces(double t, const double* y, const joints::Reactions& reactions) {
   update(t, y);
@@ -125,21 +71,6 @@ scene::Forces System::forces(double t, const double* y, const joints::Reactions&
   out.joints = reactions.find(rows_, bodies_.all(), dynamics_.multipliers().data());
   for (const auto& force : forces_) force->report(bodies_.all(), out);
   return out;
-}
-
-int System::constraint_count() const {
-  return 2 * in_use_.count() + moving() + invariants_.count();
-}
-
-void System::joint_values(double t, const double* y, double* g) {
-  update(t, y);
-  rows_.values<0>(bodies_.all(), g);
-  rows_.values<1>(bodies_.all(), g + rows());
-}
-
-void System::constraint_values(double t, const double* y, double* g) {
-  row_values(t, y, g);
-  if (invariants_.count() > 0) invariants_.values(t, y, g + first_invariant());
 }
 
 // Rows of joints on positions, on velocities, and norms of quaternions.
@@ -255,10 +186,6 @@ std::vector<std::string> System::constraint_names() const {
   for (int k = 0; k < moving(); ++k) names.emplace_back("quaternion norm");
   invariants_.add_names(names);
   return names;
-}
-
-ida_projection::Constraints System::constraints() {
-  return in_use_.in_place() ? sparse_constraints() : dense_constraints();
 }
 
 ida_projection::Constraints System::dense_constraints() {

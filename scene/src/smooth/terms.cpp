@@ -51,18 +51,6 @@ void JacobianTerms::add_rows(JacobianBlocks& J, int first_row, const RowsInUse* 
   });
 }
 
-void JacobianTerms::add_power(JacobianBlocks& J) const {
-  for (const auto& force : forces)
-    if (force->has_power()) force->add_power_jacobian(bodies.all(), J);
-}
-
-AccelerationJacobian::AccelerationJacobian(const JacobianTerms& terms,
-                                           const ForwardDynamics& dynamics)
-    : terms_(terms), dynamics_(dynamics) {
-  const int n = 6 * terms.bodies.count();
-  left_.setZero(n + terms.rows.count(), kBody * terms.bodies.count());
-}
-
 // D over A.
 void AccelerationJacobian::form_left() {
   const int n = 6 * terms_.bodies.count(), pitch = n + terms_.rows.count();
@@ -145,14 +133,6 @@ void ForwardDynamics::solve(const std::vector<Load6>& loads) {
     solve_dense();
 }
 
-void ForwardDynamics::solve_sparse() {
-  sparse_->factor();
-  sparse_->multiply(free_, right_);
-  right_ = -gamma_ - right_;
-  sparse_->solve(right_, change_, lambda_);
-  a_ += change_;
-}
-
 void ForwardDynamics::solve_dense() {
   gradient_.form(rows_, bodies_);
   right_ = -gamma_;
@@ -168,14 +148,6 @@ void ForwardDynamics::solve_dense() {
     lambda_ += scratch_;
   }
   a_.noalias() += gradient_.GM.transpose() * lambda_;
-}
-
-void ForwardDynamics::set_accelerations() {
-  for (int k = 0; k < bodies_.count(); ++k) {
-    Frame<double>& f = bodies_.frame(k);
-    f.a = a_.segment<3>(6 * k);
-    f.alpha = f.R * a_.segment<3>(6 * k + 3);
-  }
 }
 
 KeptInvariants::KeptInvariants(const Scene& scene, const MovingBodies& bodies, const Forces& forces,
@@ -210,20 +182,6 @@ KeptInvariants::KeptInvariants(const Scene& scene, const MovingBodies& bodies, c
   kept_.assign(rows_.size(), 0.0);
 }
 
-void KeptInvariants::keep(double t, const double* y) {
-  std::fill(kept_.begin(), kept_.end(), 0.0);
-  if (kept_.empty()) return;
-  std::vector<double> now(kept_.size());
-  values(t, y, now.data());
-  kept_ = now;
-}
-
-double KeptInvariants::energy() const {
-  double sum = bodies_.kinetic_energy();
-  for (const auto& force : forces_) sum += force->potential(bodies_.all());
-  return sum;
-}
-
 void KeptInvariants::values(double t, const double* y, double* g) const {
   const Vector3d P = bodies_.momentum() - t * steady_force_, L = bodies_.angular_momentum();
   for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -233,10 +191,6 @@ void KeptInvariants::values(double t, const double* y, double* g) const {
     else
       g[k] = row.along.dot(row.kind == InvariantKind::momentum ? P : L) - kept_[k];
   }
-}
-
-void KeptInvariants::jacobian(ConstraintRows C, int row) const {
-  for (const Row& each : rows_) put_gradient(each, C.row(row++));
 }
 
 // A component of angular momentum is u . (x x m v + R I w).
@@ -263,22 +217,6 @@ void KeptInvariants::put_gradient(const Row& of, Eigen::Ref<Eigen::RowVectorXd> 
   if (!energy) return;
   for (const auto& force : forces_) force->add_potential_gradient(bodies_.all(), row.data());
   if (has_work()) row[work_] -= 1.0;
-}
-
-void KeptInvariants::add_names(std::vector<std::string>& names) const {
-  for (const Row& each : rows_)
-    names.emplace_back(each.kind == InvariantKind::energy     ? "energy"
-                       : each.kind == InvariantKind::momentum ? "momentum"
-                                                              : "angular momentum");
-}
-
-std::vector<double> KeptInvariants::units(const Units& units) const {
-  std::vector<double> all;
-  for (const Row& each : rows_)
-    all.push_back(each.kind == InvariantKind::energy     ? units.energy()
-                  : each.kind == InvariantKind::momentum ? units.momentum()
-                                                         : units.angular_momentum());
-  return all;
 }
 
 }  // namespace tether::scene::smooth

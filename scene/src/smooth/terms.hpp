@@ -29,14 +29,38 @@ class KeptInvariants {
   /// Values at the start, to save and to set.
   std::vector<double>& kept() { return kept_; }
   /// Keeps those of the state that is set from now on.
-  void keep(double t, const double* y);
+  void keep(double t, const double* y) {
+    std::fill(kept_.begin(), kept_.end(), 0.0);
+    if (kept_.empty()) return;
+    std::vector<double> now(kept_.size());
+    values(t, y, now.data());
+    kept_ = now;
+  }
 
-  double energy() const;
+  double energy() const {
+    double sum = bodies_.kinetic_energy();
+    for (const auto& force : forces_) sum += force->potential(bodies_.all());
+    return sum;
+  }
   void values(double t, const double* y, double* g) const;
-  void jacobian(ConstraintRows C, int row) const;
-  void add_names(std::vector<std::string>& names) const;
+  void jacobian(ConstraintRows C, int row) const {
+    for (const Row& each : rows_) put_gradient(each, C.row(row++));
+  }
+  void add_names(std::vector<std::string>& names) const {
+    for (const Row& each : rows_)
+      names.emplace_back(each.kind == InvariantKind::energy     ? "energy"
+                         : each.kind == InvariantKind::momentum ? "momentum"
+                                                                : "angular momentum");
+  }
   /// Unit of each value in SI.
-  std::vector<double> units(const Units& units) const;
+  std::vector<double> units(const Units& units) const {
+    std::vector<double> all;
+    for (const Row& each : rows_)
+      all.push_back(each.kind == InvariantKind::energy     ? units.energy()
+                    : each.kind == InvariantKind::momentum ? units.momentum()
+                                                           : units.angular_momentum());
+    return all;
+  }
 
  private:
   /// Energy less work, or a component of momentum or of angular momentum about the origin.
@@ -65,7 +89,13 @@ class ForwardDynamics {
   /// At the state that is set; torques in body axes. Leaves the accelerations of the frames at 0.
   void solve(const std::vector<Load6>& loads);
   /// Puts the accelerations into the frames.
-  void set_accelerations();
+  void set_accelerations() {
+    for (int k = 0; k < bodies_.count(); ++k) {
+      Frame<double>& f = bodies_.frame(k);
+      f.a = a_.segment<3>(6 * k);
+      f.alpha = f.R * a_.segment<3>(6 * k + 3);
+    }
+  }
 
   const Eigen::VectorXd& multipliers() const { return lambda_; }
   const Eigen::VectorXd& accelerations() const { return a_; }
@@ -77,7 +107,13 @@ class ForwardDynamics {
 
  private:
   void solve_dense();
-  void solve_sparse();
+  void solve_sparse() {
+    sparse_->factor();
+    sparse_->multiply(free_, right_);
+    right_ = -gamma_ - right_;
+    sparse_->solve(right_, change_, lambda_);
+    a_ += change_;
+  }
 
   const JointRows& rows_;
   MovingBodies& bodies_;
@@ -102,14 +138,21 @@ struct JacobianTerms {
   /// without a multiplier are 0 then.
   void add_rows(JacobianBlocks& J, int first_row, const RowsInUse* in_use, double cj) const;
   /// Minus the derivatives of the power of all forces, by multipliers apart.
-  void add_power(JacobianBlocks& J) const;
+  void add_power(JacobianBlocks& J) const {
+    for (const auto& force : forces)
+      if (force->has_power()) force->add_power_jacobian(bodies.all(), J);
+  }
 };
 
 /// With D = -d(f + G^T lambda)/dy and A = dg''/dy at fixed a and lambda:
 /// M da = G^T dlambda - D dy, G da = -A dy.
 class AccelerationJacobian {
  public:
-  AccelerationJacobian(const JacobianTerms& terms, const ForwardDynamics& dynamics);
+  AccelerationJacobian(const JacobianTerms& terms, const ForwardDynamics& dynamics)
+      : terms_(terms), dynamics_(dynamics) {
+    const int n = 6 * terms.bodies.count();
+    left_.setZero(n + terms.rows.count(), kBody * terms.bodies.count());
+  }
 
   /// At the state that is set, with its multipliers, accelerations and turns.
   void form();

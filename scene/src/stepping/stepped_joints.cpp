@@ -6,34 +6,6 @@ namespace tether::scene::stepping {
 
 using namespace mechanics;
 
-SteppedJoints::SteppedJoints(const Scene& scene)
-    : bodies_(scene),
-      rows_(scene, bodies_.bodies()),
-      reactions_(scene, bodies_.bodies()),
-      laws_(scene, bodies_.bodies()) {}
-
-void SteppedJoints::add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) {
-  bodies_.set_time(t, 0);
-  bodies_.copy(bodies);
-  laws_.add(bodies_.bodies(), out);
-}
-
-std::vector<JointForce> SteppedJoints::reactions(const contact::BodySet& bodies, double t,
-                                                 const std::vector<double>& impulses, double dt) {
-  bodies_.copy(bodies);
-  rows_.set_time(t);
-  std::vector<double> multipliers(at(rows_.count()), 0);
-  for (std::size_t i = 0; i < multipliers.size() && dt > 0; ++i) multipliers[i] = impulses[i] / dt;
-  return reactions_.find(rows_, bodies_.bodies(), multipliers.data());
-}
-
-void SteppedJoints::values(const contact::BodySet& bodies, double t, double* g) {
-  bodies_.copy(bodies);
-  rows_.set_time(t);
-  rows_.values<0>(bodies_.bodies(), g);
-  std::fill_n(g + rows_.count(), laws_.slips().size(), 0.0);
-}
-
 // A multiplier pulls with the gradient of its row. JointRows::each goes kind by kind, and rows are
 // numbered joint by joint; the parts of a coupling may have bodies in common.
 void SteppedJoints::add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) {

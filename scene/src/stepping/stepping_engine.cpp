@@ -308,13 +308,6 @@ void SteppingEngine::advance(double t) {
   if (moved) read_bodies();
 }
 
-void SteppingEngine::take_step() {
-  step();
-  if (on_failure_ != OnFailure::stop || stepper_.succeeded()) return;
-  read_bodies();
-  report_failure();
-}
-
 void SteppingEngine::step() {
   try {
     stepper_.step();
@@ -449,12 +442,6 @@ Counts SteppingEngine::counts() const {
   out.accepted = c.accepted;
   out.halved = c.halved;
   out.error_test_failures = c.rejected;
-  return out;
-}
-
-std::vector<EffectCost> SteppingEngine::costs() const {
-  std::vector<EffectCost> out;
-  for (const contact::StageCost& c : stepper_.costs()) out.push_back({c.effect, c.seconds});
   return out;
 }
 

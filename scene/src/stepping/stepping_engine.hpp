@@ -12,21 +12,41 @@ namespace tether::scene::stepping {
 /// bodies of the scene.
 class SteppedJoints final : public contact::JointEquations {
  public:
-  explicit SteppedJoints(const Scene& scene);
+  explicit SteppedJoints(const Scene& scene)
+      : bodies_(scene),
+        rows_(scene, bodies_.bodies()),
+        reactions_(scene, bodies_.bodies()),
+        laws_(scene, bodies_.bodies()) {}
 
   /// The last ones are of zeros: they join the bodies of a cable that rubs, which has laws only.
   int rows() const override { return rows_.count() + static_cast<int>(laws_.slips().size()); }
-  void values(const contact::BodySet& bodies, double t, double* g) override;
+  void values(const contact::BodySet& bodies, double t, double* g) override {
+    bodies_.copy(bodies);
+    rows_.set_time(t);
+    rows_.values<0>(bodies_.bodies(), g);
+    std::fill_n(g + rows_.count(), laws_.slips().size(), 0.0);
+  }
   void add_rows(const contact::BodySet& bodies, double t, contact::JointRows& out) override;
   /// Impulses by row, over dt, as forces at these positions.
   std::vector<JointForce> reactions(const contact::BodySet& bodies, double t,
-                                    const std::vector<double>& impulses, double dt);
+                                    const std::vector<double>& impulses, double dt) {
+    bodies_.copy(bodies);
+    rows_.set_time(t);
+    std::vector<double> multipliers(mechanics::at(rows_.count()), 0);
+    for (std::size_t i = 0; i < multipliers.size() && dt > 0; ++i)
+      multipliers[i] = impulses[i] / dt;
+    return reactions_.find(rows_, bodies_.bodies(), multipliers.data());
+  }
   /// Adds those of the laws there.
   void add_law_forces(const std::vector<double>& impulses, double dt, Forces& out) const {
     laws_.add_forces(bodies_.bodies(), impulses, dt, out);
   }
   bool has_laws() const override { return laws_.any(); }
-  void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override;
+  void add_laws(const contact::BodySet& bodies, double t, contact::JointLaws& out) override {
+    bodies_.set_time(t, 0);
+    bodies_.copy(bodies);
+    laws_.add(bodies_.bodies(), out);
+  }
   bool change_bounds(const std::vector<double>& impulses, double dt,
                      contact::JointLaws& laws) override {
     return laws_.change_bounds(impulses, dt, laws);
@@ -73,14 +93,23 @@ class SteppingEngine final : public Engine {
   const std::vector<ContactState>& contacts() const override;
   Forces forces() const override;
   Counts counts() const override;
-  std::vector<EffectCost> costs() const override;
+  std::vector<EffectCost> costs() const override {
+    std::vector<EffectCost> out;
+    for (const contact::StageCost& c : stepper_.costs()) out.push_back({c.effect, c.seconds});
+    return out;
+  }
   void save(std::ostream& out) const override;
   void restore(std::istream& in, Restore how) override;
 
  private:
   void step();
   void watch_energy(const Scene& scene);
-  void take_step();
+  void take_step() {
+    step();
+    if (on_failure_ != OnFailure::stop || stepper_.succeeded()) return;
+    read_bodies();
+    report_failure();
+  }
   void report_failure() const;
   void read_bodies();
   void set_bodies(const std::vector<BodyState>& states);

@@ -59,15 +59,6 @@ IdaSession::IdaSession(QuietContext& context, const Start& start, IdaEquations& 
   if (max_step > 0) check(IDASetMaxStep(ida_, max_step), "IDASetMaxStep");
 }
 
-IdaSession::~IdaSession() {
-  IDAFree(&ida_);  // before the projection, which it calls
-}
-
-void IdaSession::check(int flag, const char* call) const {
-  if (flag < 0)
-    throw std::runtime_error(std::string(call) + ": " + name(flag) + ". " + context_.message());
-}
-
 void IdaSession::use(SUNLinearSolver solver, SUNMatrix matrix) {
   check(IDASetLinearSolver(ida_, solver, matrix), "IDASetLinearSolver");
   if (matrix != nullptr) check(IDASetJacFn(ida_, jacobian), "IDASetJacFn");
@@ -84,11 +75,6 @@ void IdaSession::project(const ida_projection::Constraints& constraints,
   projection_.emplace(ida_, constraints, options);
 }
 
-int IdaSession::solve(double to, double& reached, int task) {
-  context_.message().clear();
-  return IDASolve(ida_, to, &reached, y(), yp(), task);
-}
-
 void IdaSession::at(double time, Eigen::VectorXd& out) const {
   out.resize(N_VGetLength(y()));
   const OwnedVector vector(N_VMake_Serial(out.size(), out.data(), context_));
@@ -100,21 +86,6 @@ bool IdaSession::projected_at(double time, Eigen::VectorXd& out) {
   if (!projection_) return true;
   const OwnedVector vector(N_VMake_Serial(out.size(), out.data(), context_));
   return static_cast<bool>(projection_->project(time, vector.get()));
-}
-
-std::string IdaSession::name(int flag) {
-  const std::unique_ptr<char, Released<std::free>> text(IDAGetReturnFlagName(flag));
-  return text.get();
-}
-
-Counts IdaSession::counts() const {
-  Counts c;
-  IDAGetNumSteps(ida_, &c.steps);
-  IDAGetNumResEvals(ida_, &c.residual_evaluations);
-  IDAGetNumJacEvals(ida_, &c.jacobian_evaluations);
-  IDAGetNumErrTestFails(ida_, &c.error_test_failures);
-  if (projection_) c.projections = projection_->statistics().projections;
-  return c;
 }
 
 OwnedLinearSolver dense_solver(N_Vector y, SUNMatrix matrix, SUNContext context) {

@@ -60,12 +60,17 @@ class IdaSession {
   };
   /// Steps are counted by the caller.
   IdaSession(QuietContext& context, const Start& start, IdaEquations& equations, double max_step);
-  ~IdaSession();
+  ~IdaSession() {
+    IDAFree(&ida_);  // before the projection, which it calls
+  }
   IdaSession(const IdaSession&) = delete;
   IdaSession& operator=(const IdaSession&) = delete;
 
   /// Throws std::runtime_error with the name of the call where IDA refuses it.
-  void check(int flag, const char* call) const;
+  void check(int flag, const char* call) const {
+    if (flag < 0)
+      throw std::runtime_error(std::string(call) + ": " + name(flag) + ". " + context_.message());
+  }
   void set_first_step(double h) { check(IDASetInitStep(ida_, h), "IDASetInitStep"); }
   void set_newton(double part_of_tolerance) {
     check(IDASetNonlinConvCoef(ida_, part_of_tolerance), "IDASetNonlinConvCoef");
@@ -85,15 +90,29 @@ class IdaSession {
     return projection_ ? &*projection_ : nullptr;
   }
 
-  int solve(double to, double& reached, int task);
+  int solve(double to, double& reached, int task) {
+    context_.message().clear();
+    return IDASolve(ida_, to, &reached, y(), yp(), task);
+  }
   /// y at a time of the last step: interpolated.
   void at(double time, Eigen::VectorXd& y) const;
   /// The same, moved onto the constraints; false: it could not be.
   bool projected_at(double time, Eigen::VectorXd& y);
   /// The name of a flag.
-  static std::string name(int flag);
+  static std::string name(int flag) {
+    const std::unique_ptr<char, Released<std::free>> text(IDAGetReturnFlagName(flag));
+    return text.get();
+  }
   /// IDA's work so far, and the projection's.
-  Counts counts() const;
+  Counts counts() const {
+    Counts c;
+    IDAGetNumSteps(ida_, &c.steps);
+    IDAGetNumResEvals(ida_, &c.residual_evaluations);
+    IDAGetNumJacEvals(ida_, &c.jacobian_evaluations);
+    IDAGetNumErrTestFails(ida_, &c.error_test_failures);
+    if (projection_) c.projections = projection_->statistics().projections;
+    return c;
+  }
 
  private:
   QuietContext& context_;

@@ -236,8 +236,6 @@ std::string shown(const Value& value) {
   return "";
 }
 
-Value::Value() : held(Entries()) {}
-
 Entry* find_entry(Value& table, std::string_view key) {
   if (auto* entries = std::get_if<Value::Entries>(&table.held))
     for (Entry& each : *entries)

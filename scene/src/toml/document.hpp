@@ -23,7 +23,8 @@ class Value {
   using Items = std::vector<Value>;
   using Entries = std::vector<Entry>;  ///< in the order of the keys' names
 
-  Value();  ///< a table without keys
+  /// a table without keys
+  Value() : held(Entries()) {}
 
   Kind kind() const { return static_cast<Kind>(held.index()); }
   /// A value of another kind gives false, 0 or empty.

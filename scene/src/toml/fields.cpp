@@ -30,59 +30,10 @@ const Range kPositivePart{kAboveZero, 1, "a number > 0 and <= 1"};
 
 bool Range::holds(double x) const { return std::isfinite(x) && x >= low && x <= high; }
 
-Fields::Fields(const Value* table, std::string path, const std::string& file, Report& report)
-    : table_(table), path_(std::move(path)), place_{file, 0, 0}, report_(report) {
-  if (table_ != nullptr) place_ = {file, table_->line, table_->column};
-}
-
-const Entry* Fields::entry(std::string_view key) {
-  if (!contains(known_, key)) known_.emplace_back(key);
-  if (table_ == nullptr) return nullptr;
-  for (const Entry& each : table_->entries())
-    if (each.key == key) return &each;
-  return nullptr;
-}
-
-const Value* Fields::find(std::string_view key) {
-  const Entry* found = entry(key);
-  return found != nullptr ? &found->value : nullptr;
-}
-
-Place Fields::place(std::string_view key) {
-  const Entry* found = entry(key);
-  return found != nullptr ? Place{place_.file, found->line, found->column} : place_;
-}
-
-std::string Fields::field(std::string_view key) const {
-  if (path_.empty()) return std::string(key);
-  return fmt::format("{}: {}", path_, key);
-}
-
 void Fields::wrong(const Entry& which, const Value& value, std::string allowed) {
   Place at{place_.file, which.line, which.column};
   if (value.line > 0) at.line = value.line, at.column = value.column;
   report_.add(at, field(which.key), shown(value), std::move(allowed));
-}
-
-void Fields::wrong(std::string_view key, std::string allowed) {
-  if (const Entry* found = entry(key))
-    wrong(*found, found->value, std::move(allowed));
-  else
-    missing(key, std::move(allowed));
-}
-
-void Fields::missing(std::string_view key, std::string allowed) {
-  entry(key);
-  report_.add(place_, field(key), "", "is missing; " + std::move(allowed));
-}
-
-template <class T, class Get, class Allowed>
-T Fields::value(std::string_view key, T otherwise, const Get& get, const Allowed& allowed) {
-  const Entry* found = entry(key);
-  if (found == nullptr) return otherwise;
-  if (std::optional<T> right = get(found->value)) return *std::move(right);
-  wrong(*found, found->value, allowed());
-  return otherwise;
 }
 
 double Fields::number(std::string_view key, double otherwise, const Range& range,
@@ -105,23 +56,6 @@ int Fields::count(std::string_view key, int otherwise, int low, int high) {
         return right ? std::optional(static_cast<int>(v.number())) : std::nullopt;
       },
       [&] { return fmt::format("must be a whole number from {} to {}", low, high); });
-}
-
-bool Fields::flag(std::string_view key, bool otherwise) {
-  return value(
-      key, otherwise,
-      [](const Value& v) {
-        return v.kind() == Value::Kind::boolean ? std::optional(v.boolean()) : std::nullopt;
-      },
-      [] { return "must be true or false"; });
-}
-
-std::string Fields::text(std::string_view key, const std::string& otherwise) {
-  return text(key, otherwise, is_plain, kPlain);
-}
-
-std::string Fields::name(std::string_view key, const std::string& otherwise) {
-  return text(key, otherwise, is_name, kName);
 }
 
 std::string Fields::text(std::string_view key, const std::string& otherwise,
@@ -149,8 +83,6 @@ std::string Fields::output_name(std::string_view key, std::string_view ending) {
                          ending));
   return "";
 }
-
-std::string Fields::input_name(std::string_view key) { return inside(key, text(key, ""), "scene"); }
 
 // No way out of the folder, no pipe of a program that takes names for commands.
 std::string Fields::inside(std::string_view key, const std::string& file, const char* whose) {
@@ -228,16 +160,6 @@ std::vector<Eigen::Vector3d> Fields::points(std::string_view key, std::size_t le
       });
 }
 
-std::vector<std::array<double, 2>> Fields::pairs(std::string_view key, std::size_t most) {
-  std::vector<std::array<double, 2>> out;
-  const Value* value = find(key);
-  if (value == nullptr || !each_row(*value, 1, most, 2, [&](const Value::Items& row) {
-        out.push_back({row[0].number(), row[1].number()});
-      }))
-    out.clear();
-  return out;
-}
-
 double Fields::angle(const std::string& stem, double otherwise, std::string_view unit_end) {
   const std::string deg = stem + "deg", rad = stem + "rad";
   const Entry* in_deg = entry(deg);
@@ -268,15 +190,6 @@ int Fields::choice(std::string_view key, const std::vector<std::string>& words) 
       });
 }
 
-const Value* Fields::table(std::string_view key) {
-  return value<const Value*>(
-      key, nullptr,
-      [](const Value& v) {
-        return v.kind() == Value::Kind::table ? std::optional(&v) : std::nullopt;
-      },
-      [&] { return fmt::format("must be a table: [{}]", key); });
-}
-
 std::vector<const Value*> Fields::tables(std::string_view key) {
   const Entry* found = entry(key);
   std::vector<const Value*> out;
@@ -288,33 +201,6 @@ std::vector<const Value*> Fields::tables(std::string_view key) {
       out.push_back(&item);
     else
       wrong(*found, item, fmt::format("must be a table: [[{}]]", key));
-  return out;
-}
-
-void Fields::finish() {
-  if (table_ == nullptr) return;
-  for (const Entry& each : table_->entries()) {
-    if (contains(known_, each.key)) continue;
-    report_.add({place_.file, each.line, each.column}, field(each.key), shown(each.value),
-                "unknown key" + (report_.full() ? "" : hint(each.key, known_)));
-  }
-}
-
-int Reader::named(Fields& in, std::string_view key, const std::string& kind,
-                  const std::map<std::string, int>& all) const {
-  if (!in.has(key)) return in.missing(key, "the name of a " + kind), 0;
-  const std::string name = in.name(key, "");
-  if (const auto found = all.find(name); found != all.end()) return found->second;
-  in.wrong(key, "no such " + kind + hint_of(name, all));
-  return 0;
-}
-
-std::vector<int> Reader::several_bodies(Fields& in, std::size_t least, std::size_t most,
-                                        const char* allowed) const {
-  std::vector<int> out;
-  for (const std::string& name :
-       names(in, "bodies", least, most, allowed, "there is no body", bodies, "world"))
-    out.push_back(name == "world" ? -1 : bodies.at(name));
   return out;
 }
 

@@ -24,19 +24,35 @@ extern const Range kAny, kPositive, kNotNegative, kPart, kPositivePart;
 class Fields {
  public:
   /// `table` may be null (an absent table: everything has its default).
-  Fields(const Value* table, std::string path, const std::string& file, Report& report);
+  Fields(const Value* table, std::string path, const std::string& file, Report& report)
+      : table_(table), path_(std::move(path)), place_{file, 0, 0}, report_(report) {
+    if (table_ != nullptr) place_ = {file, table_->line, table_->column};
+  }
 
   bool has(std::string_view key) { return find(key) != nullptr; }
   double number(std::string_view key, double otherwise, const Range& range, std::string_view unit);
   int count(std::string_view key, int otherwise, int low, int high);
-  bool flag(std::string_view key, bool otherwise);
-  std::string text(std::string_view key, const std::string& otherwise);  ///< is_plain
-  std::string name(std::string_view key, const std::string& otherwise);  ///< is_name
+  bool flag(std::string_view key, bool otherwise) {
+    return value(
+        key, otherwise,
+        [](const Value& v) {
+          return v.kind() == Value::Kind::boolean ? std::optional(v.boolean()) : std::nullopt;
+        },
+        [] { return "must be true or false"; });
+  }
+  /// is_plain
+  std::string text(std::string_view key, const std::string& otherwise) {
+    return text(key, otherwise, is_plain, kPlain);
+  }
+  /// is_name
+  std::string name(std::string_view key, const std::string& otherwise) {
+    return text(key, otherwise, is_name, kName);
+  }
   /// The name of an output inside its folder, with the ending of its kind; empty if absent or
   /// wrong.
   std::string output_name(std::string_view key, std::string_view ending);
   /// The name of a file to read, inside the folder of the scene; empty if absent or wrong.
-  std::string input_name(std::string_view key);
+  std::string input_name(std::string_view key) { return inside(key, text(key, ""), "scene"); }
   Eigen::Vector3d vector(std::string_view key, const Eigen::Vector3d& otherwise, const Range& range,
                          std::string_view unit);
   /// A direction of any length but zero; returned with length one.
@@ -47,7 +63,15 @@ class Fields {
   /// An array of vectors, `least` to `most` of them; empty if absent or wrong.
   std::vector<Eigen::Vector3d> points(std::string_view key, std::size_t least, std::size_t most);
   /// An array of 1 to `most` rows [a, b]; nothing, and nothing reported, where it is none.
-  std::vector<std::array<double, 2>> pairs(std::string_view key, std::size_t most);
+  std::vector<std::array<double, 2>> pairs(std::string_view key, std::size_t most) {
+    std::vector<std::array<double, 2>> out;
+    const Value* value = find(key);
+    if (value == nullptr || !each_row(*value, 1, most, 2, [&](const Value::Items& row) {
+          out.push_back({row[0].number(), row[1].number()});
+        }))
+      out.clear();
+    return out;
+  }
   /// An angle by the unit in its key: <stem>deg or <stem>rad; in radians.
   double angle(const std::string& stem, double otherwise, std::string_view unit_end = "");
   /// One of the words of E; nothing if it is absent or wrong.
@@ -70,34 +94,77 @@ class Fields {
     for (const std::string_view key : keys) find(key);
   }
   /// A table inside; null if absent or no table.
-  const Value* table(std::string_view key);
+  const Value* table(std::string_view key) {
+    return value<const Value*>(
+        key, nullptr,
+        [](const Value& v) {
+          return v.kind() == Value::Kind::table ? std::optional(&v) : std::nullopt;
+        },
+        [&] { return fmt::format("must be a table: [{}]", key); });
+  }
   /// The elements of an array of tables; empty if absent.
   std::vector<const Value*> tables(std::string_view key);
   /// A value of any kind; null if absent.
-  const Value* find(std::string_view key);
+  const Value* find(std::string_view key) {
+    const Entry* found = entry(key);
+    return found != nullptr ? &found->value : nullptr;
+  }
 
   /// A required field is missing.
-  void missing(std::string_view key, std::string allowed);
+  void missing(std::string_view key, std::string allowed) {
+    entry(key);
+    report_.add(place_, field(key), "", "is missing; " + std::move(allowed));
+  }
   /// The field is there and wrong.
-  void wrong(std::string_view key, std::string allowed);
+  void wrong(std::string_view key, std::string allowed) {
+    if (const Entry* found = entry(key))
+      wrong(*found, found->value, std::move(allowed));
+    else
+      missing(key, std::move(allowed));
+  }
   /// Keys that no reader has used.
-  void finish();
+  void finish() {
+    if (table_ == nullptr) return;
+    for (const Entry& each : table_->entries()) {
+      if (contains(known_, each.key)) continue;
+      report_.add({place_.file, each.line, each.column}, field(each.key), shown(each.value),
+                  "unknown key" + (report_.full() ? "" : hint(each.key, known_)));
+    }
+  }
 
   Place place() const { return place_; }
-  Place place(std::string_view key);
+  Place place(std::string_view key) {
+    const Entry* found = entry(key);
+    return found != nullptr ? Place{place_.file, found->line, found->column} : place_;
+  }
   const std::string& path() const { return path_; }
   void rename(std::string path) { path_ = std::move(path); }
-  std::string field(std::string_view key) const;
+  std::string field(std::string_view key) const {
+    if (path_.empty()) return std::string(key);
+    return fmt::format("{}: {}", path_, key);
+  }
 
  private:
   /// get(the value): what it is, nothing where it is not right; allowed(): what would be.
   template <class T, class Get, class Allowed>
-  T value(std::string_view key, T otherwise, const Get& get, const Allowed& allowed);
+  T value(std::string_view key, T otherwise, const Get& get, const Allowed& allowed) {
+    const Entry* found = entry(key);
+    if (found == nullptr) return otherwise;
+    if (std::optional<T> right = get(found->value)) return *std::move(right);
+    wrong(*found, found->value, allowed());
+    return otherwise;
+  }
   std::string text(std::string_view key, const std::string& otherwise,
                    bool (*is_good)(std::string_view), const char* good);
   std::string inside(std::string_view key, const std::string& file, const char* whose);
   void wrong(const Entry& entry, const Value& value, std::string allowed);
-  const Entry* entry(std::string_view key);
+  const Entry* entry(std::string_view key) {
+    if (!contains(known_, key)) known_.emplace_back(key);
+    if (table_ == nullptr) return nullptr;
+    for (const Entry& each : table_->entries())
+      if (each.key == key) return &each;
+    return nullptr;
+  }
 
   const Value* table_;
   std::string path_;
@@ -136,7 +203,13 @@ struct Reader {
 
   /// The element of [[kind]] that `key` names, by its number in `all`; 0 where it is wrong.
   int named(Fields& in, std::string_view key, const std::string& kind,
-            const std::map<std::string, int>& all) const;
+            const std::map<std::string, int>& all) const {
+    if (!in.has(key)) return in.missing(key, "the name of a " + kind), 0;
+    const std::string name = in.name(key, "");
+    if (const auto found = all.find(name); found != all.end()) return found->second;
+    in.wrong(key, "no such " + kind + hint_of(name, all));
+    return 0;
+  }
   /// An array of `least` to `most` names of `known` ones, or of `besides`; empty where it is wrong:
   /// `unknown` says what a name is that is not known.
   template <class Known>
@@ -161,7 +234,13 @@ struct Reader {
   }
   /// bodies = ["a", "world", ...], `least` to `most`, -1 being the world; empty where it is wrong.
   std::vector<int> several_bodies(Fields& in, std::size_t least, std::size_t most,
-                                  const char* allowed) const;
+                                  const char* allowed) const {
+    std::vector<int> out;
+    for (const std::string& name :
+         names(in, "bodies", least, most, allowed, "there is no body", bodies, "world"))
+      out.push_back(name == "world" ? -1 : bodies.at(name));
+    return out;
+  }
 
  private:
   /// `; did you mean ...?`; nothing for problems beyond those shown: each hint compares all names.

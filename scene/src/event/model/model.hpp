@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <string>
+#include <tether/linalg/index.hpp>
 #include <vector>
 
 #include "bounds.hpp"
@@ -13,6 +14,7 @@ namespace tether::scene::event {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using linalg::at;
 
 /// One potential contact at the state that is set. `u`: the velocities of the model.
 struct ContactKinematics {

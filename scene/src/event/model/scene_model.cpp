@@ -63,24 +63,6 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
 
 SceneModel::~SceneModel() = default;
 
-VectorXd SceneModel::start() const {
-  const std::vector<double>& y = bodies_.start();
-  VectorXd out(coordinates() + velocities());
-  for (int k = 0; k < bodies_.count(); ++k) {
-    std::copy_n(y.data() + kBody * k, 7, out.data() + 7 * k);
-    std::copy_n(y.data() + kBody * k + kVelocity, 6, out.data() + coordinates() + 6 * k);
-  }
-  return out;
-}
-
-void SceneModel::add_moments() {
-  for (int k = 0; k < pairs(); ++k) {
-    using Kind = ContactLaw::Kind;
-    if (pair(k).rolling > 0) moments_.push_back({pair(k).rolling, 0, Kind::rolling, 0, k});
-    if (pair(k).torsional > 0) moments_.push_back({pair(k).torsional, 0, Kind::spinning, 0, k});
-  }
-}
-
 void SceneModel::find_holding(const Scene& scene) {
   for (const Pair& from : scene.pairs)
     for (std::size_t k = 0; from.static_friction && k < pairs_.size(); ++k) {
@@ -94,27 +76,6 @@ void SceneModel::find_holding(const Scene& scene) {
     }
   for (std::size_t k = 0; k < holding_.size(); ++k)
     holding_[k] = std::max(holding_[k], pairs_[k].friction);
-}
-
-// The slips of cables are the last laws.
-void SceneModel::share_bounds(double loaded, const std::vector<LawForce>& forces,
-                              std::vector<double>& bounds) const {
-  joint_laws().grip(bodies_.all(), rings_);
-  const std::size_t first = at(first_moment()) - rings_.size();
-  bounds.resize(forces.size());
-  effects::share_tensions(
-      rings_, loaded, [&](std::size_t ring) { return forces[first + ring]; },
-      [&](std::size_t ring, double bound) { bounds[first + ring] = bound; });
-}
-
-std::string SceneModel::contact_name(int contact) const {
-  if (is_moment(contact)) contact = moment(contact).held_by;
-  if (const auto* slip = slip_law(contact))
-    return "the cable \"" + spring_names_[at(slip->cable())] + "\"";
-  if (is_law(contact))
-    return "the limit of joint \"" + joint_names_[at(laws_.all().joint(joint_law(contact)))] + "\"";
-  const FeaturePair& p = pair(contact);
-  return "\"" + body_names_[at(p.first)] + "\" and \"" + body_names_[at(p.second)] + "\"";
 }
 
 void SceneModel::set(double t, const double* y) {
@@ -139,28 +100,6 @@ void SceneModel::settle() {
     axes_[i] = Vector3d::Unit(least);
   }
 }
-
-int SceneModel::axis(int contact) const {
-  if (!is_pair(contact)) return 0;
-  Eigen::Index k = 0;
-  axes_[at(contact)].maxCoeff(&k);
-  return static_cast<int>(k);
-}
-
-void SceneModel::set_axis(int contact, int axis) {
-  if (is_pair(contact)) axes_[at(contact)] = Vector3d::Unit(axis);
-}
-
-void SceneModel::rates(double* q_rate) const {
-  for (int k = 0; k < bodies_.count(); ++k) {
-    const double* s = y_.data() + kBody * k;
-    std::copy_n(s + kVelocity, 3, q_rate + 7 * k);
-    Eigen::Map<Eigen::Vector4d>(q_rate + 7 * k + 3) =
-        quaternion_rate(s + kQuaternion, Eigen::Map<const Vector3d>(s + kSpin));
-  }
-}
-
-void SceneModel::divide_by_mass(Eigen::Ref<MatrixXd> X) const { bodies_.divide_by_mass(X); }
 
 void SceneModel::forces(VectorXd& h) {
   clear(loads_);
@@ -236,15 +175,6 @@ Vector3d SceneModel::relative_velocity(const FeaturePair& p, const Touch& touch)
   return A.v + A.W.cross(touch.point - A.x) - B.v - B.W.cross(touch.point - B.x);
 }
 
-Vector3d SceneModel::slip_of(int contact) const {
-  const FeaturePair& p = pair(contact);
-  const Touch touch = p.touch(bodies_.all());
-  Vector3d slip = relative_velocity(p, touch);
-  if (!surface_.empty())
-    slip += surface_velocity(p.first, touch).x - surface_velocity(p.second, touch).x;
-  return slip - touch.normal.dot(slip) * touch.normal;
-}
-
 // The axis along the normal has no direction there: any one is taken.
 std::array<Jet<double>, 2> SceneModel::scaled_tangents(const FeaturePair& p,
                                                        const Touch& touch) const {
@@ -315,11 +245,6 @@ void SceneModel::evaluate_moment(const ContactLaw& moment, ContactKinematics& ou
   }
 }
 
-std::array<Vector3d, 2> SceneModel::tangents_of(int contact, const Vector3d& normal) const {
-  const Vector3d t1 = normal.cross(axes_[at(contact)]).normalized();
-  return {t1, normal.cross(t1)};
-}
-
 Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
   const bool turns = is_moment(contact), spins = turns && moment(contact).is_line();
@@ -335,20 +260,6 @@ Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   return (turns ? 0 : parts[0]) * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
 }
 
-Forces SceneModel::forces_of(const joints::Reactions& reactions,
-                             const VectorXd& multipliers) const {
-  Forces out;
-  out.joints = reactions.find(rows_, bodies_.all(), multipliers.data());
-  for (const auto& force : forces_) force->report(bodies_.all(), out);
-  return out;
-}
-
-std::string SceneModel::undecided(int contact) {
-  return is_pair(contact) && pair(contact).is_flush(bodies_.all())
-             ? "a cylinder lies on its flat end, whose contact the event engine does not have"
-             : "";
-}
-
 bool SceneModel::are_at_one_edge(int contact, int other, double distance) {
   return square_between(contact, other, distance) > kOtherNormal;
 }
@@ -359,44 +270,6 @@ bool SceneModel::are_one(int contact, int other, double distance) {
   return square >= 0 && square <= kOtherNormal;
 }
 
-// Square of the sine between the normals of two contacts at one point; -1: at two points.
-double SceneModel::square_between(int contact, int other, double distance) {
-  if (!is_pair(contact) || !is_pair(other)) return -1;
-  const FeaturePair &p = pair(contact), &q = pair(other);
-  if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return -1;
-  const Touch a = p.touch(bodies_.all()), b = q.touch(bodies_.all());
-  if ((a.point - b.point).norm() > distance) return -1;
-  return a.normal.cross(b.normal).squaredNorm();
-}
-
-void SceneModel::to_coordinates(const double* row, double* gradient) const {
-  for (int k = 0; k < bodies_.count(); ++k) {
-    const double* q = y_.data() + kBody * k + kQuaternion;
-    std::copy_n(row + 6 * k, 3, gradient + 7 * k);
-    Eigen::Map<Eigen::RowVector4d>(gradient + 7 * k + 3) =
-        Eigen::Map<const Eigen::RowVector3d>(row + 6 * k + 3) * turn_of_quaternion(q);
-  }
-}
-
-void SceneModel::own_values(double* values) const {
-  for (int k = 0; k < bodies_.count(); ++k)
-    values[k] =
-        0.5 *
-        (Eigen::Map<const Eigen::Vector4d>(y_.data() + kBody * k + kQuaternion).squaredNorm() - 1);
-}
-
-void SceneModel::own_gradient(int row, double* gradient) const {
-  std::copy_n(y_.data() + kBody * row + kQuaternion, 4, gradient + 7 * row + 3);
-}
-
-double SceneModel::potential() const {
-  double sum = 0;
-  for (const auto& force : forces_) sum += force->potential(bodies_.all());
-  return sum;
-}
-
-double SceneModel::energy() const { return bodies_.kinetic_energy() + potential(); }
-
 void SceneModel::energy_gradient(double* by_q, double* by_u) const {
   std::vector<double> row(at(kBody * bodies_.count()));
   for (const auto& force : forces_) force->add_potential_gradient(bodies_.all(), row.data());
@@ -406,18 +279,6 @@ void SceneModel::energy_gradient(double* by_q, double* by_u) const {
     Eigen::Map<Vector3d>(by_u + 6 * k) = inertia.mass * bodies_.frame(k).v;
     Eigen::Map<Vector3d>(by_u + 6 * k + 3) = inertia.inertia * bodies_.spin(k);
   }
-}
-
-bool SceneModel::does_work() const {
-  return rows_.has_motion() ||
-         any_of(forces_, [](const auto& force) { return force->has_power(); });
-}
-
-double SceneModel::power() const {
-  double sum = 0;
-  for (const auto& force : forces_)
-    if (force->has_power()) sum += force->power(bodies_.all());
-  return sum;
 }
 
 }  // namespace tether::scene::event

@@ -47,21 +47,52 @@ class SceneModel final : public Model {
   bool shares_bound(int contact) const override {
     return is_law(contact) && joint_laws().shares_tension(joint_law(contact));
   }
+  // The slips of cables are the last laws.
   void share_bounds(double loaded, const std::vector<LawForce>& forces,
-                    std::vector<double>& bounds) const override;
+                    std::vector<double>& bounds) const override {
+    joint_laws().grip(bodies_.all(), rings_);
+    const std::size_t first = at(first_moment()) - rings_.size();
+    bounds.resize(forces.size());
+    effects::share_tensions(
+        rings_, loaded, [&](std::size_t ring) { return forces[first + ring]; },
+        [&](std::size_t ring, double bound) { bounds[first + ring] = bound; });
+  }
 
   void set(double t, const double* y) override;
   double next_kink(double t) const override { return effects::next_kink(kinks_, t); }
   void begin_anew(double t) override { bodies_.begin_anew(t); }
   void settle() override;
-  int axis(int contact) const override;
-  void set_axis(int contact, int axis) override;
-  void rates(double* q_rate) const override;
-  void divide_by_mass(Eigen::Ref<MatrixXd> X) const override;
+  int axis(int contact) const override {
+    if (!is_pair(contact)) return 0;
+    Eigen::Index k = 0;
+    axes_[at(contact)].maxCoeff(&k);
+    return static_cast<int>(k);
+  }
+  void set_axis(int contact, int axis) override {
+    if (is_pair(contact)) axes_[at(contact)] = Vector3d::Unit(axis);
+  }
+  void rates(double* q_rate) const override {
+    for (int k = 0; k < bodies_.count(); ++k) {
+      const double* s = y_.data() + kBody * k;
+      std::copy_n(s + kVelocity, 3, q_rate + 7 * k);
+      Eigen::Map<Eigen::Vector4d>(q_rate + 7 * k + 3) =
+          quaternion_rate(s + kQuaternion, Eigen::Map<const Vector3d>(s + kSpin));
+    }
+  }
+  void divide_by_mass(Eigen::Ref<MatrixXd> X) const override { bodies_.divide_by_mass(X); }
   void forces(VectorXd& h) override;
   void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) override;
   std::string joint_name(int row) const override { return "joint \"" + rows_.joint_of(row) + "\""; }
-  std::string contact_name(int contact) const override;
+  std::string contact_name(int contact) const override {
+    if (is_moment(contact)) contact = moment(contact).held_by;
+    if (const auto* slip = slip_law(contact))
+      return "the cable \"" + spring_names_[at(slip->cable())] + "\"";
+    if (is_law(contact))
+      return "the limit of joint \"" + joint_names_[at(laws_.all().joint(joint_law(contact)))] +
+             "\"";
+    const FeaturePair& p = pair(contact);
+    return "\"" + body_names_[at(p.first)] + "\" and \"" + body_names_[at(p.second)] + "\"";
+  }
   void evaluate_contact(int contact, ContactKinematics& out) override;
   double gap(int contact, double& rate) override {
     if (is_law(contact)) return laws_.gap(contact - pairs(), bodies_.all(), rate);
@@ -81,27 +112,69 @@ class SceneModel final : public Model {
     return is_pair(contact) ? pair(contact).margin(bodies_.all()) : kInfinity;
   }
 
-  std::string undecided(int contact) override;
+  std::string undecided(int contact) override {
+    return is_pair(contact) && pair(contact).is_flush(bodies_.all())
+               ? "a cylinder lies on its flat end, whose contact the event engine does not have"
+               : "";
+  }
 
   bool are_at_one_edge(int contact, int other, double distance) override;
   bool are_one(int contact, int other, double distance) override;
 
   Vector3d in_space(int contact, const VectorXd& parts) override;
   /// Relative velocity of a pair at its point without the normal part, world axes.
-  Vector3d slip_of(int contact) const;
+  Vector3d slip_of(int contact) const {
+    const FeaturePair& p = pair(contact);
+    const Touch touch = p.touch(bodies_.all());
+    Vector3d slip = relative_velocity(p, touch);
+    if (!surface_.empty())
+      slip += surface_velocity(p.first, touch).x - surface_velocity(p.second, touch).x;
+    return slip - touch.normal.dot(slip) * touch.normal;
+  }
 
-  void to_coordinates(const double* row, double* gradient) const override;
+  void to_coordinates(const double* row, double* gradient) const override {
+    for (int k = 0; k < bodies_.count(); ++k) {
+      const double* q = y_.data() + kBody * k + kQuaternion;
+      std::copy_n(row + 6 * k, 3, gradient + 7 * k);
+      Eigen::Map<Eigen::RowVector4d>(gradient + 7 * k + 3) =
+          Eigen::Map<const Eigen::RowVector3d>(row + 6 * k + 3) * turn_of_quaternion(q);
+    }
+  }
   int own_rows() const override { return bodies_.count(); }
-  void own_values(double* values) const override;
-  void own_gradient(int row, double* gradient) const override;
+  void own_values(double* values) const override {
+    for (int k = 0; k < bodies_.count(); ++k)
+      values[k] =
+          0.5 *
+          (Eigen::Map<const Eigen::Vector4d>(y_.data() + kBody * k + kQuaternion).squaredNorm() -
+           1);
+  }
+  void own_gradient(int row, double* gradient) const override {
+    std::copy_n(y_.data() + kBody * row + kQuaternion, 4, gradient + 7 * row + 3);
+  }
 
-  double energy() const override;
+  double energy() const override { return bodies_.kinetic_energy() + potential(); }
   void energy_gradient(double* by_q, double* by_u) const override;
-  bool does_work() const override;
-  double power() const override;
+  bool does_work() const override {
+    return rows_.has_motion() ||
+           any_of(forces_, [](const auto& force) { return force->has_power(); });
+  }
+  double power() const override {
+    double sum = 0;
+    for (const auto& force : forces_)
+      if (force->has_power()) sum += force->power(bodies_.all());
+    return sum;
+  }
 
   /// q, then u, at t = 0.
-  VectorXd start() const;
+  VectorXd start() const {
+    const std::vector<double>& y = bodies_.start();
+    VectorXd out(coordinates() + velocities());
+    for (int k = 0; k < bodies_.count(); ++k) {
+      std::copy_n(y.data() + kBody * k, 7, out.data() + 7 * k);
+      std::copy_n(y.data() + kBody * k + kVelocity, 6, out.data() + coordinates() + 6 * k);
+    }
+    return out;
+  }
   bool is_pair(int contact) const { return contact < pairs(); }
   bool is_law(int contact) const { return contact >= pairs() && contact < first_moment(); }
   bool is_moment(int contact) const { return contact >= first_moment(); }
@@ -118,28 +191,54 @@ class SceneModel final : public Model {
   }
   const smooth::MovingBodies& bodies() const { return bodies_; }
   const double* bodies_state() const { return y_.data(); }  ///< as MovingBodies has it
-  double potential() const;
+  double potential() const {
+    double sum = 0;
+    for (const auto& force : forces_) sum += force->potential(bodies_.all());
+    return sum;
+  }
   /// Adds the force of a closed contact that is a law of a joint or cable to the force of that.
   void add_law_force(int contact, const VectorXd& parts, Forces& out) const {
     joint_laws().add_force(joint_law(contact), bodies_.all(),
                            law(contact).is_bounded() ? parts[1] : parts[0], out);
   }
   /// Forces of joints, by the multipliers of their rows, and of springs, at the state that is set.
-  Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const;
+  Forces forces_of(const joints::Reactions& reactions, const VectorXd& multipliers) const {
+    Forces out;
+    out.joints = reactions.find(rows_, bodies_.all(), multipliers.data());
+    for (const auto& force : forces_) force->report(bodies_.all(), out);
+    return out;
+  }
 
  private:
   int first_moment() const { return pairs() + laws_.count(); }
   /// Rolling or torsional friction of a pair.
   const ContactLaw& moment(int contact) const { return moments_[at(contact - first_moment())]; }
-  void add_moments();
+  void add_moments() {
+    for (int k = 0; k < pairs(); ++k) {
+      using Kind = ContactLaw::Kind;
+      if (pair(k).rolling > 0) moments_.push_back({pair(k).rolling, 0, Kind::rolling, 0, k});
+      if (pair(k).torsional > 0) moments_.push_back({pair(k).torsional, 0, Kind::spinning, 0, k});
+    }
+  }
   void find_holding(const Scene& scene);
   bool conveys(int body) const { return !surface_.empty() && surface_[at(body)].has_value(); }
   Vector3d relative_velocity(const FeaturePair& pair, const Touch& touch) const;
   /// Velocity of the surface of a body at a point, and its rate where the point moves.
   Jet<double> surface_velocity(int body, const Touch& touch) const;
   void evaluate_moment(const ContactLaw& moment, ContactKinematics& out);
-  double square_between(int contact, int other, double distance);
-  std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const;
+  // Square of the sine between the normals of two contacts at one point; -1: at two points.
+  double square_between(int contact, int other, double distance) {
+    if (!is_pair(contact) || !is_pair(other)) return -1;
+    const FeaturePair &p = pair(contact), &q = pair(other);
+    if (std::minmax(p.first, p.second) != std::minmax(q.first, q.second)) return -1;
+    const Touch a = p.touch(bodies_.all()), b = q.touch(bodies_.all());
+    if ((a.point - b.point).norm() > distance) return -1;
+    return a.normal.cross(b.normal).squaredNorm();
+  }
+  std::array<Vector3d, 2> tangents_of(int contact, const Vector3d& normal) const {
+    const Vector3d t1 = normal.cross(axes_[at(contact)]).normalized();
+    return {t1, normal.cross(t1)};
+  }
   /// Tangents with their rates, each as long as its coefficient of friction over the larger one.
   std::array<Jet<double>, 2> scaled_tangents(const FeaturePair& pair, const Touch& touch) const;
 

@@ -11,8 +11,6 @@ namespace tether::scene::event {
 
 using contact::Cone;
 using contact::Regime;
-using linalg::at;
-
 namespace {
 
 constexpr double kSolve = 1e-12;   // tolerance of the contact library
@@ -339,14 +337,6 @@ void ContactRows::take_rows() {
   }
 }
 
-VectorXd ContactRows::of(int k, const VectorXd& values) const {
-  const ConePart& p = parts_[at(k)];
-  VectorXd out = VectorXd::Zero(1 + model_.tangents());
-  if (p.has_normal()) out[0] = values[p.first];
-  out.segment(1, p.slips) = p.slip_of(values);
-  return out;
-}
-
 bool ContactRows::share_bounds(const FrictionSolution& answer,
                                const std::vector<VectorXd>& slides) {
   std::vector<std::size_t> sharing;
@@ -392,28 +382,6 @@ void ContactRows::free_held() {
       A_(i, i) = most;
     }
   }
-}
-
-// Rows of unit length: whether one depends on others does not depend on masses.
-void ContactRows::factor_joints() {
-  scale_.setOnes(G_.rows());
-  for (int i = 0; i < G_.rows(); ++i) {
-    const double square = G_.row(i).dot(MG_.col(i));
-    if (square > 0) scale_[i] = 1 / std::sqrt(square);
-  }
-  factor_.factor(scale_.asDiagonal() * (G_ * MG_) * scale_.asDiagonal());
-}
-
-MatrixXd ContactRows::joint_solve(const MatrixXd& right) const {
-  return scale_.asDiagonal() * MatrixXd(factor_.solve_columns(scale_.asDiagonal() * right));
-}
-
-VectorXd ContactRows::free_accelerations() {
-  VectorXd a;
-  model_.forces(a);
-  model_.divide_by_mass(a);
-  if (G_.rows() > 0) a -= MG_ * joint_solve(G_ * a + joint_rest_);
-  return L_ * a + rest_;
 }
 
 }  // namespace tether::scene::event

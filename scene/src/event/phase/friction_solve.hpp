@@ -63,11 +63,23 @@ class ContactRows {
   const MatrixXd& A() const { return A_; }
   FrictionProblem problem(const VectorXd& b) const { return {A_, b, parts_}; }
   /// The values of contact k out of those by row: normal, then tangents, zero without a row.
-  VectorXd of(int k, const VectorXd& values) const;
+  VectorXd of(int k, const VectorXd& values) const {
+    const ConePart& p = parts_[at(k)];
+    VectorXd out = VectorXd::Zero(1 + model_.tangents());
+    if (p.has_normal()) out[0] = values[p.first];
+    out.segment(1, p.slips) = p.slip_of(values);
+    return out;
+  }
   /// Velocities by row.
   VectorXd velocities(const VectorXd& u) const { return L_ * u + rate_; }
   /// Accelerations by row without forces in them, and those of the model.
-  VectorXd free_accelerations();
+  VectorXd free_accelerations() {
+    VectorXd a;
+    model_.forces(a);
+    model_.divide_by_mass(a);
+    if (G_.rows() > 0) a -= MG_ * joint_solve(G_ * a + joint_rest_);
+    return L_ * a + rest_;
+  }
   VectorXd change(const VectorXd& x) const { return PL_ * x; }
   /// Gives parts that share their bounds those that the forces x of an answer leave. True: they
   /// are others now.
@@ -75,9 +87,20 @@ class ContactRows {
 
  private:
   void take_rows();
-  void factor_joints();
+  // Rows of unit length: whether one depends on others does not depend on masses.
+  void factor_joints() {
+    scale_.setOnes(G_.rows());
+    for (int i = 0; i < G_.rows(); ++i) {
+      const double square = G_.row(i).dot(MG_.col(i));
+      if (square > 0) scale_[i] = 1 / std::sqrt(square);
+    }
+    factor_.factor(scale_.asDiagonal() * (G_ * MG_) * scale_.asDiagonal());
+  }
   void free_held();
-  MatrixXd joint_solve(const MatrixXd& right) const;  ///< (G M^-1 G')^+ right
+  /// (G M^-1 G')^+ right
+  MatrixXd joint_solve(const MatrixXd& right) const {
+    return scale_.asDiagonal() * MatrixXd(factor_.solve_columns(scale_.asDiagonal() * right));
+  }
 
   Model& model_;
   std::vector<int> contacts_;

@@ -109,36 +109,12 @@ Motion::Motion(Model& model, double tolerance, double t, const VectorXd& y)
       nq_(model.coordinates()),
       nu_(model.velocities()),
       tangents_(model.tangents()),
-      modes_(index(model.contacts())),
-      levels_(index(model.contacts()), 0.0) {
+      modes_(at(model.contacts())),
+      levels_(at(model.contacts()), 0.0) {
   u_.setZero(nu_);
   a_.setZero(nu_);
   set(t, y.data());
   bands_ = bands_of(model, tolerance);
-}
-
-void Motion::set(double t, const double* y) {
-  model_.set(t, y);
-  u_ = Eigen::Map<const VectorXd>(y + nq_, nu_);
-}
-
-VectorXd Motion::slip_of(const ContactKinematics& kinematics) const {
-  return kinematics.tangents * u_ + kinematics.slip_rate;
-}
-
-VectorXd Motion::slip_rate(int closed) const {
-  const ContactKinematics& kinematics = kinematics_[index(closed)];
-  return kinematics.tangents * a_ + kinematics.slip_rest;
-}
-
-// Slip that ends passes through zero within a step: its direction stays.
-VectorXd Motion::held_slip(int closed) const {
-  const int contact = closed_[index(closed)];
-  const VectorXd& direction = modes_[index(contact)].direction;
-  VectorXd s = slip_of(kinematics_[index(closed)]);
-  const double along = s.dot(direction), least = bands_.slip(contact);
-  if (along < least) s += (least - along) * direction;
-  return s;
 }
 
 void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
@@ -156,24 +132,14 @@ void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
   slips.conservativeResize(size);
 }
 
-void Motion::find_holders() {
-  holder_.resize(closed_.size());
-  for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const int by = model_.law(closed_[k]).held_by;
-    const auto from = by < 0 ? closed_.begin() + static_cast<std::ptrdiff_t>(k)
-                             : std::lower_bound(closed_.begin(), closed_.end(), by);
-    holder_[k] = static_cast<std::size_t>(from - closed_.begin());
-  }
-}
-
 void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes) {
   closed_.clear();
   set(t, y.data());
   for (int i = 0; i < model_.contacts(); ++i) {
-    if (modes[index(i)].mode == Mode::open) continue;
+    if (modes[at(i)].mode == Mode::open) continue;
     closed_.push_back(i);
     double rate = 0;
-    if (modes_[index(i)].mode == Mode::open) levels_[index(i)] = model_.gap(i, rate);
+    if (modes_[at(i)].mode == Mode::open) levels_[at(i)] = model_.gap(i, rate);
   }
   modes_ = std::move(modes);
   kinematics_.resize(closed_.size());
@@ -266,7 +232,7 @@ bool Motion::other_joint_rows_are_better(double t, const VectorXd& y) {
 void Motion::evaluate_joints() {
   model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
   for (int k = 0; k < joints_; ++k) {
-    const int from = joints_in_use_[index(k)];
+    const int from = joints_in_use_[at(k)];
     if (from == k) continue;
     joint_g_[k] = joint_g_[from];
     joint_W_.row(k) = joint_W_.row(from);
@@ -312,7 +278,7 @@ void Motion::gather() {
 int Motion::choose_rows() {
   positions_in_use_.clear();
   rates_in_use_.clear();
-  rate_place_.assign(index(rows_), -1);
+  rate_place_.assign(at(rows_), -1);
   row_scale_.setOnes(rows_);
   spare_rows_ = 0;
   if (rows_ == 0) return 0;
@@ -337,25 +303,20 @@ int Motion::choose_rows() {
     if (!independent.add(row_scale_[row] * R_.row(row).transpose())) continue;
     if (row < joints_) ++rank_of_joints;
     if (k < positions) positions_in_use_.push_back(row);
-    rate_place_[index(row)] = static_cast<int>(rates_in_use_.size());
+    rate_place_[at(row)] = static_cast<int>(rates_in_use_.size());
     rates_in_use_.push_back(row);
   }
   spare_rows_ = rows_ - joints_ - (independent.rank() - rank_of_joints);
   return independent.rank();
 }
 
-double Motion::bound(std::size_t closed) const {
-  const int contact = closed_[closed];
-  return contains(sharing_, closed) ? bounds_[index(contact)] : model_.law(contact).bound;
-}
-
 // Laws that slide get their bounds without the forces of those that stick, whose columns have the
 // rest.
 void Motion::share_bounds() {
-  shared_.assign(index(model_.contacts()), {});
-  const auto force_of = [&](std::size_t k) -> LawForce& { return shared_[index(closed_[k])]; };
+  shared_.assign(at(model_.contacts()), {});
+  const auto force_of = [&](std::size_t k) -> LawForce& { return shared_[at(closed_[k])]; };
   for (const std::size_t k : sharing_)
-    if (!sticks(k)) force_of(k).slides = -modes_[index(closed_[k])].direction[0];
+    if (!sticks(k)) force_of(k).slides = -modes_[at(closed_[k])].direction[0];
   model_.share_bounds(1, shared_, bounds_);
   for (const std::size_t k : sharing_) {
     if (!sticks(k)) continue;
@@ -363,16 +324,9 @@ void Motion::share_bounds() {
     model_.share_bounds(0, shared_, bounds_moved_);
     force_of(k).held = 0;
     for (const std::size_t j : sharing_)
-      C_.col(row_of_[k]) += force_of(j).slides * bounds_moved_[index(closed_[j])] *
+      C_.col(row_of_[k]) += force_of(j).slides * bounds_moved_[at(closed_[j])] *
                             kinematics_[j].tangents.row(0).transpose();
   }
-}
-
-// With all forces.
-void Motion::find_bounds() {
-  for (const std::size_t k : sharing_)
-    if (sticks(k)) shared_[index(closed_[k])].held = lambda_[row_of_[k]];
-  model_.share_bounds(1, shared_, bounds_);
 }
 
 // Accelerations without the forces of rows, and the columns of these.
@@ -426,7 +380,7 @@ VectorXd Motion::joint_forces() {
   model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
   VectorXd load = VectorXd::Zero(nu_);
   for (int k = 0; k < joints_; ++k)
-    load += lambda_[k] * joint_W_.row(joints_in_use_[index(k)]).transpose();
+    load += lambda_[k] * joint_W_.row(joints_in_use_[at(k)]).transpose();
   linalg::LeastSquares factor(kDependentRow);
   factor.factor(joint_W_.transpose());
   return factor.solve(load);
@@ -435,7 +389,7 @@ VectorXd Motion::joint_forces() {
 std::vector<VectorXd> Motion::slides() const {
   std::vector<VectorXd> out(closed_.size());
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const ContactMode& mode = modes_[index(closed_[k])];
+    const ContactMode& mode = modes_[at(closed_[k])];
     if (mode.mode != Mode::slide) continue;
     const VectorXd s = slip_of(kinematics_[k]);
     const bool fast = s.dot(mode.direction) > bands_.slip(closed_[k]);
@@ -487,7 +441,7 @@ std::vector<VectorXd> Motion::contact_forces() {
 }
 
 VectorXd Motion::friction_force(int closed) const {
-  const auto k = index(closed);
+  const auto k = at(closed);
   const int row = row_of_[k];
   const ContactLaw law = model_.law(closed_[k]);
   if (sticks(k)) {
@@ -496,7 +450,7 @@ VectorXd Motion::friction_force(int closed) const {
     force.head(n) = lambda_.segment(row + normals_of(k), n);
     return force;
   }
-  if (law.is_bounded()) return -bound(k) * modes_[index(closed_[k])].direction;
+  if (law.is_bounded()) return -bound(k) * modes_[at(closed_[k])].direction;
   const double mu = law.friction;
   if (mu == 0) return VectorXd::Zero(tangents_);
   const VectorXd s = held_slip(closed);
@@ -505,16 +459,6 @@ VectorXd Motion::friction_force(int closed) const {
 
 // Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
 // energy less work (method, eq. 3).
-
-int Motion::constraint_count() const {
-  return static_cast<int>(positions_in_use_.size() + rates_in_use_.size()) + model_.own_rows() +
-         (energy_row_ != EnergyRow::none ? 1 : 0);
-}
-
-void Motion::keep_energy_of(double t, const VectorXd& y) {
-  set(t, y.data());
-  kept_energy_ = model_.energy() - y[work()];
-}
 
 // Values of all rows at the state that is set; slips have no position.
 void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
@@ -528,7 +472,7 @@ void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k], tangents = tangents_of(k);
     if (normals_of(k) > 0) {
-      positions[row] = kinematics_[k].gap - levels_[index(closed_[k])];
+      positions[row] = kinematics_[k].gap - levels_[at(closed_[k])];
       rates[row] += kinematics_[k].normal_rate;
     }
     rates.segment(row + normals_of(k), tangents) += kinematics_[k].slip_rate.head(tangents);
@@ -576,7 +520,7 @@ void Motion::differentiate_contacts(int j, double step, const VectorXd& rates, i
     now.tail(rows - normals) =
         (kinematics.tangents * u_ + kinematics.slip_rate).head(rows - normals);
     for (int r = 0; r < rows; ++r)
-      if (const int place = rate_place_[index(row + r)]; place >= 0)
+      if (const int place = rate_place_[at(row + r)]; place >= 0)
         C(first_rate + place, j) = (now[r] - rates[row + r]) / step;
   }
 }

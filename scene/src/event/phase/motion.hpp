@@ -19,6 +19,7 @@
 #pragma once
 
 #include "event/model/model.hpp"
+#include "lists.hpp"
 #include "row_islands.hpp"
 
 namespace tether::scene::event {
@@ -76,9 +77,7 @@ class Motion {
   /// Some closed contacts share their forces in more than one way.
   bool is_hyperstatic() const { return spare_rows_ > 0; }
   /// A sliding contact has turned to this direction.
-  void turn(int contact, const VectorXd& direction) {
-    modes_[index(contact)].direction = direction;
-  }
+  void turn(int contact, const VectorXd& direction) { modes_[at(contact)].direction = direction; }
 
   /// An open contact whose gap closes at the border of its features, at (t, y), which is set, but
   /// that touches nothing: on its way out, or on its way along the border with a closed contact.
@@ -89,7 +88,7 @@ class Motion {
   void rate(double t, const double* y, double* y_rate);
   const VectorXd& acceleration() const { return a_; }
   double normal_force(int closed) const {  ///< of a bounded law: its bound
-    return is_bounded(index(closed)) ? bound(index(closed)) : lambda_[normal_row(index(closed))];
+    return is_bounded(at(closed)) ? bound(at(closed)) : lambda_[normal_row(at(closed))];
   }
   VectorXd friction_force(int closed) const;  ///< by tangents
   /// Forces of all rows of joints: redundant ones share.
@@ -101,9 +100,13 @@ class Motion {
   bool forces_are_lawful() const;
   /// Directions of the closed contacts that slide; empty where they stick.
   std::vector<VectorXd> slides() const;
-  const ContactKinematics& kinematics(int closed) const { return kinematics_[index(closed)]; }
-  VectorXd slip(int closed) const { return slip_of(kinematics_[index(closed)]); }
-  VectorXd slip_rate(int closed) const;            ///< at the state of the last rate()
+  const ContactKinematics& kinematics(int closed) const { return kinematics_[at(closed)]; }
+  VectorXd slip(int closed) const { return slip_of(kinematics_[at(closed)]); }
+  /// At the state of the last rate().
+  VectorXd slip_rate(int closed) const {
+    const ContactKinematics& kinematics = kinematics_[at(closed)];
+    return kinematics.tangents * a_ + kinematics.slip_rest;
+  }
   double work_done() const { return work_done_; }  ///< operations, roughly
   /// Slips of the contacts that slide with friction at (t, y), one after the other.
   void slips_with_friction(double t, const double* y, VectorXd& slips);
@@ -112,25 +115,38 @@ class Motion {
 
   /// The constraints of the phase on y: joints and gaps, their rates, slips of stuck contacts, own
   /// rows of the model, energy.
-  int constraint_count() const;
+  int constraint_count() const {
+    return static_cast<int>(positions_in_use_.size() + rates_in_use_.size()) + model_.own_rows() +
+           (energy_row_ != EnergyRow::none ? 1 : 0);
+  }
   void constraints(double t, const double* y, double* g);
   void constraint_gradient(double t, const double* y,
                            Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   /// Energy less work is that of this state from now on.
-  void keep_energy_of(double t, const VectorXd& y);
+  void keep_energy_of(double t, const VectorXd& y) {
+    set(t, y.data());
+    kept_energy_ = model_.energy() - y[work()];
+  }
   void leave_energy_free() { energy_row_ = EnergyRow::none; }  ///< until modes are chosen again
   void keep_energy(double value) { kept_energy_ = value; }
   double kept_energy() const { return kept_energy_; }
   double energy() const { return model_.energy(); }  ///< of the state that was evaluated last
 
  private:
-  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
-  VectorXd slip_of(const ContactKinematics& kinematics) const;
-  VectorXd held_slip(int closed) const;
-  bool is_bounded(std::size_t closed) const { return model_.law(closed_[closed]).is_bounded(); }
-  bool sticks(std::size_t closed) const {
-    return modes_[index(closed_[closed])].mode == Mode::stick;
+  VectorXd slip_of(const ContactKinematics& kinematics) const {
+    return kinematics.tangents * u_ + kinematics.slip_rate;
   }
+  // Slip that ends passes through zero within a step: its direction stays.
+  VectorXd held_slip(int closed) const {
+    const int contact = closed_[at(closed)];
+    const VectorXd& direction = modes_[at(contact)].direction;
+    VectorXd s = slip_of(kinematics_[at(closed)]);
+    const double along = s.dot(direction), least = bands_.slip(contact);
+    if (along < least) s += (least - along) * direction;
+    return s;
+  }
+  bool is_bounded(std::size_t closed) const { return model_.law(closed_[closed]).is_bounded(); }
+  bool sticks(std::size_t closed) const { return modes_[at(closed_[closed])].mode == Mode::stick; }
   double friction(std::size_t closed) const {
     return sticks(closed) ? model_.holding(closed_[closed]) : model_.law(closed_[closed]).friction;
   }
@@ -143,11 +159,30 @@ class Motion {
   }
   /// Its own, or that which holds it.
   int normal_row(std::size_t closed) const { return row_of_[holder_[closed]]; }
-  double bound(std::size_t closed) const;
+  double bound(std::size_t closed) const {
+    const int contact = closed_[closed];
+    return contains(sharing_, closed) ? bounds_[at(contact)] : model_.law(contact).bound;
+  }
   void share_bounds();
-  void find_bounds();
-  void set(double t, const double* y);
-  void find_holders();
+  // With all forces.
+  void find_bounds() {
+    for (const std::size_t k : sharing_)
+      if (sticks(k)) shared_[at(closed_[k])].held = lambda_[row_of_[k]];
+    model_.share_bounds(1, shared_, bounds_);
+  }
+  void set(double t, const double* y) {
+    model_.set(t, y);
+    u_ = Eigen::Map<const VectorXd>(y + nq_, nu_);
+  }
+  void find_holders() {
+    holder_.resize(closed_.size());
+    for (std::size_t k = 0; k < closed_.size(); ++k) {
+      const int by = model_.law(closed_[k]).held_by;
+      const auto from = by < 0 ? closed_.begin() + static_cast<std::ptrdiff_t>(k)
+                               : std::lower_bound(closed_.begin(), closed_.end(), by);
+      holder_[k] = static_cast<std::size_t>(from - closed_.begin());
+    }
+  }
   void prepare(double t, const double* y);
   void finish_rate(double* y_rate);
   void gather();

@@ -42,11 +42,6 @@ Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const 
   if (std::isfinite(length_)) session_->set_stop(length_);
 }
 
-void Phase::residual(double t, const double* y, const double* yp, double* r) {
-  motion_.rate(start_ + t, y, rate_.data());
-  for (int i = 0; i < rate_.size(); ++i) r[i] = yp[i] - rate_[i];
-}
-
 // The force of a slip s turns with 1 / |s|.
 bool Phase::has_turned(double t, N_Vector y) {
   motion_.slips_with_friction(start_ + t, N_VGetArrayPointer(y), slips_);
@@ -133,12 +128,6 @@ void Phase::step() {
   }
   begin_ = end_;
   end_ = t;
-}
-
-bool Phase::has_weak_rows() const {
-  VectorXd y;
-  at(end_, y);
-  return motion_.other_joint_rows_are_better(start_ + end_, y);
 }
 
 // Newton's shortest moves, until they are a thousandth of the tolerance; few, since only what an

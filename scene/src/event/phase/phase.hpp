@@ -29,11 +29,18 @@ class Phase : public IdaEquations {
   /// The same, moved onto the constraints.
   void projected_at(double time, VectorXd& y) { session_->projected_at(time, y); }
   /// Joints would be better held by other rows than those that were chosen at the start.
-  bool has_weak_rows() const;
+  bool has_weak_rows() const {
+    VectorXd y;
+    at(end_, y);
+    return motion_.other_joint_rows_are_better(start_ + end_, y);
+  }
   Counts counts() const { return session_->counts(); }  ///< of IDA
 
  private:
-  void residual(double t, const double* y, const double* yp, double* r) override;
+  void residual(double t, const double* y, const double* yp, double* r) override {
+    motion_.rate(start_ + t, y, rate_.data());
+    for (int i = 0; i < rate_.size(); ++i) r[i] = yp[i] - rate_[i];
+  }
   void jacobian(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) override;
   void project();
   double size_of(int i, double value) const { return sizes_[i] + std::abs(value); }

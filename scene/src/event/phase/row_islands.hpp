@@ -9,8 +9,6 @@
 
 namespace tether::scene::event {
 
-using linalg::at;
-
 /// K = S R M^-1 C S of rows R and columns C, S a diagonal. Rows of bodies that no row connects do
 /// not meet in it: each such island has factors of its own.
 class RowIslands {

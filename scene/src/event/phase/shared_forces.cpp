@@ -7,8 +7,6 @@
 namespace tether::scene::event {
 
 using contact::Regime;
-using linalg::at;
-
 namespace {
 
 constexpr double kContradicts = 1e-10;  // of b

@@ -191,22 +191,6 @@ void Watcher::evaluate(double t, const VectorXd& y, double by) {
   }
 }
 
-double Watcher::value(Function& f, double t, const VectorXd& y) {
-  if (f.what == Watch::gap)
-    motion_.model().set(t, y.data());
-  else
-    motion_.rate(t, y.data(), rate_.data());
-  return of_state(f);
-}
-
-// Whether a gap or slip that is positive at both ends of a step, and falls, then rises, can reach
-// zero.
-bool Watcher::may_dip(const Function& f) const {
-  return (f.what == Watch::gap || f.what == Watch::slip) && f.is(State::armed) &&
-         f.slope_before < 0 && f.slope > 0 && f.before > 0 &&
-         std::min(f.before, f.value) < (end_ - begin_) * std::max(-f.slope_before, f.slope);
-}
-
 // The least or largest value of a gap or slip that turns in the last step.
 double Watcher::turn(Phase& phase, Function f, double& when) {
   const double a = begin_, b = end_, before = f.slope_before, after = f.slope;
@@ -285,17 +269,6 @@ double Watcher::way(Phase& phase, const VectorXd& at_end) {
   phase.at(phase.step_begin(), y_);
   return kFasterWithin * 2 * std::max(fastest(y_), fastest(at_end)) *
          (phase.step_end() - phase.step_begin());
-}
-
-// Whether a function has a zero within the interval that is searched.
-bool Watcher::is_hit(Phase& phase, const Function& f) {
-  bool hit = f.value < (f.is(State::armed) ? 0 : -band(f));
-  // Else it is on its way out; its first gaps are lost in rounding.
-  const bool from_zero =
-      !f.is(State::armed) || (f.start == Start::leaving && f.value > -bands().gap(f.contact));
-  if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
-  if (hit || !may_dip(f)) return hit;
-  return dips(phase, f);
 }
 
 // Else it only touches. An impact that is not seen at a depth of d changes velocities by

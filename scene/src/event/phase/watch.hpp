@@ -65,15 +65,36 @@ class Watcher {
   void wake(Phase& phase, const VectorXd& at_end, double by);
   void evaluate(double t, const VectorXd& y, double by);
   double way(Phase& phase, const VectorXd& at_end);
-  double value(Function& f, double t, const VectorXd& y);
+  double value(Function& f, double t, const VectorXd& y) {
+    if (f.what == Watch::gap)
+      motion_.model().set(t, y.data());
+    else
+      motion_.rate(t, y.data(), rate_.data());
+    return of_state(f);
+  }
   double of_state(Function& f);
   double support();
   double band(const Function& f) const;
   double lag(Phase& phase, Function f, double time);
-  bool is_hit(Phase& phase, const Function& f);
+  // Whether a function has a zero within the interval that is searched.
+  bool is_hit(Phase& phase, const Function& f) {
+    bool hit = f.value < (f.is(State::armed) ? 0 : -band(f));
+    // Else it is on its way out; its first gaps are lost in rounding.
+    const bool from_zero =
+        !f.is(State::armed) || (f.start == Start::leaving && f.value > -bands().gap(f.contact));
+    if (f.what == Watch::gap && from_zero) hit = hit && f.slope < 0;
+    if (hit || !may_dip(f)) return hit;
+    return dips(phase, f);
+  }
   bool is_hit_between(Phase& phase, Function& f);
   Zero locate(Phase& phase, Function f);
-  bool may_dip(const Function& f) const;
+  // Whether a gap or slip that is positive at both ends of a step, and falls, then rises, can reach
+  // zero.
+  bool may_dip(const Function& f) const {
+    return (f.what == Watch::gap || f.what == Watch::slip) && f.is(State::armed) &&
+           f.slope_before < 0 && f.slope > 0 && f.before > 0 &&
+           std::min(f.before, f.value) < (end_ - begin_) * std::max(-f.slope_before, f.slope);
+  }
   bool dips(Phase& phase, const Function& f);
   double turn(Phase& phase, Function f, double& when);
 

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "bounds.hpp"
+#include "files/read.hpp"
 #include "lists.hpp"
 #include "program/commands.hpp"
 
@@ -19,6 +20,74 @@ struct SweepArguments {
   int jobs = 0;
   bool quiet = false, force = false;
 };
+
+/// PATH=FROM:TO:COUNT[:log] or PATH=VALUE,VALUE,...
+struct VariedNumber {
+  std::string path;
+  std::vector<double> values;
+};
+
+[[noreturn]] void refuse(const std::string& word, const std::string& why) {
+  throw std::invalid_argument(fmt::format("--vary {}: {}", word, why));
+}
+
+std::vector<double> range(const std::string& word, const std::vector<std::string>& parts) {
+  const bool logarithmic = parts.size() == 4 && parts[3] == "log";
+  const std::optional<double> from = finite_number(parts[0]), to = finite_number(parts[1]),
+                              count = finite_number(parts[2]);
+  if ((parts.size() == 4 && !logarithmic) || !from || !to || !count)
+    refuse(word, "a range is FROM:TO:COUNT or FROM:TO:COUNT:log, e.g. 0.1:0.5:9");
+  if (*count != std::floor(*count) || *count < 2 || *count > static_cast<double>(kMostListed))
+    refuse(word, fmt::format("COUNT must be a whole number from 2 to {}", kMostListed));
+  if (logarithmic && !(*from > 0 && *to > 0)) refuse(word, "both ends of log must be > 0");
+  const int last = static_cast<int>(*count) - 1;
+  std::vector<double> values;
+  for (int k = 0; k <= last; ++k) {
+    const double share = static_cast<double>(k) / last;
+    // Values have 15 digits, so that 0.1:0.5:9 has 0.15 and not the number beside it.
+    const double value =
+        logarithmic ? *from * std::pow(*to / *from, share) : *from * (1 - share) + *to * share;
+    values.push_back(finite_number(fmt::format("{:.15g}", value)).value_or(value));
+  }
+  values.back() = *to;
+  return values;
+}
+
+/// Throws std::invalid_argument if a path leads to nothing. Values that are wrong are no matter.
+void parse_paths(const SceneText& scene, const std::vector<Setting>& settings) {
+  try {
+    parse_scene_with(scene.text, scene.name, settings);
+  } catch (const SceneError& e) {
+    // An unknown key is a path that leads to nothing; values are judged one by one.
+    for (const Problem& problem : e.problems())
+      for (const Setting& each : settings) {
+        const std::string key = each.path.substr(each.path.rfind('.') + 1);
+        const std::size_t at = problem.field.size() - std::min(problem.field.size(), key.size());
+        if (problem.allowed.rfind("unknown key", 0) == 0 && problem.field.substr(at) == key)
+          throw std::invalid_argument(fmt::format("\"{}\": {}", each.path, problem.allowed));
+      }
+  }
+}
+
+/// std::invalid_argument naming the word otherwise.
+VariedNumber read_varied(const std::string& word) {
+  const std::size_t equals = word.find('=');
+  if (equals == std::string::npos || equals == 0)
+    refuse(word, "must be PATH=VALUES, e.g. pair.friction=0.1:0.5:9");
+  VariedNumber out;
+  out.path = word.substr(0, equals);
+  const std::string values = word.substr(equals + 1);
+  if (const auto parts = files::split(values, ':'); parts.size() == 3 || parts.size() == 4) {
+    out.values = range(word, parts);
+    return out;
+  }
+  for (const std::string& each : files::split(values, ',')) {
+    const std::optional<double> value = finite_number(each);
+    if (!value) refuse(word, fmt::format("\"{}\" is not a finite number", each));
+    out.values.push_back(*value);
+  }
+  return out;
+}
 
 /// All combinations, the last range being the fastest.
 std::vector<std::vector<Setting>> combinations(const std::vector<VariedNumber>& varied) {

@@ -61,19 +61,6 @@ void MovingBodies::set_state(const double* y) {
   }
 }
 
-void MovingBodies::set_accelerations(const double* yp) {
-  for (int k = 0; k < count(); ++k) {
-    Frame<double>& f = frame(k);
-    f.a = Eigen::Map<const Vector3d>(yp + kBody * k + kVelocity);
-    f.alpha = f.R * Eigen::Map<const Vector3d>(yp + kBody * k + kSpin);
-  }
-}
-
-void MovingBodies::set_turns(const double* y) {
-  for (int k = 0; k < count(); ++k)
-    bodies_.turns[at(k)] = turn_of_quaternion(y + kBody * k + kQuaternion);
-}
-
 void MovingBodies::read(const double* y, std::vector<BodyState>& out) const {
   for (int k = 0; k < count(); ++k) {
     const double* s = y + kBody * k;
@@ -83,36 +70,6 @@ void MovingBodies::read(const double* y, std::vector<BodyState>& out) const {
     state.velocity = Eigen::Map<const Vector3d>(s + kVelocity);
     state.angular_velocity = state.orientation * Vector3d(Eigen::Map<const Vector3d>(s + kSpin));
   }
-}
-
-void MovingBodies::divide_by_mass(Eigen::Ref<Eigen::MatrixXd> X) const {
-  for (int k = 0; k < count(); ++k) {
-    X.middleRows<3>(6 * k) /= inertia(k).mass;
-    X.middleRows<3>(6 * k + 3) = (inertia(k).inverse * X.middleRows<3>(6 * k + 3)).eval();
-  }
-}
-
-double MovingBodies::kinetic_energy() const {
-  double sum = 0;
-  for (int k = 0; k < count(); ++k) {
-    const Vector3d& w = spin(k);
-    sum += 0.5 * (inertia(k).mass * frame(k).v.squaredNorm() + w.dot(inertia(k).inertia * w));
-  }
-  return sum;
-}
-
-Vector3d MovingBodies::momentum() const {
-  Vector3d sum = Vector3d::Zero();
-  for (int k = 0; k < count(); ++k) sum += inertia(k).mass * frame(k).v;
-  return sum;
-}
-
-Vector3d MovingBodies::angular_momentum() const {
-  Vector3d sum = Vector3d::Zero();
-  for (int k = 0; k < count(); ++k)
-    sum += inertia(k).mass * frame(k).x.cross(frame(k).v) +
-           frame(k).R * (inertia(k).inertia * spin(k));
-  return sum;
 }
 
 }  // namespace tether::scene::smooth

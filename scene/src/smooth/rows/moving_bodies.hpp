@@ -26,16 +26,50 @@ class MovingBodies {
 
   void set_time(double t) { bodies_.time = t; }
   void begin_anew(double t) { bodies_.since = t; }
-  void set_state(const double* y);           ///< frames, without accelerations
-  void set_accelerations(const double* yp);  ///< of the state that is set
-  void set_turns(const double* y);           ///< for derivatives by quaternions
+  void set_state(const double* y);  ///< frames, without accelerations
+  /// of the state that is set
+  void set_accelerations(const double* yp) {
+    for (int k = 0; k < count(); ++k) {
+      Frame<double>& f = frame(k);
+      f.a = Eigen::Map<const Vector3d>(yp + kBody * k + kVelocity);
+      f.alpha = f.R * Eigen::Map<const Vector3d>(yp + kBody * k + kSpin);
+    }
+  }
+  /// for derivatives by quaternions
+  void set_turns(const double* y) {
+    for (int k = 0; k < count(); ++k)
+      bodies_.turns[at(k)] = turn_of_quaternion(y + kBody * k + kQuaternion);
+  }
   void read(const double* y, std::vector<BodyState>& out) const;
 
   /// X <- M^-1 X, 6 rows a body: velocity, angular velocity in its axes.
-  void divide_by_mass(Eigen::Ref<Eigen::MatrixXd> X) const;
-  double kinetic_energy() const;
-  Vector3d momentum() const;
-  Vector3d angular_momentum() const;  ///< about the origin
+  void divide_by_mass(Eigen::Ref<Eigen::MatrixXd> X) const {
+    for (int k = 0; k < count(); ++k) {
+      X.middleRows<3>(6 * k) /= inertia(k).mass;
+      X.middleRows<3>(6 * k + 3) = (inertia(k).inverse * X.middleRows<3>(6 * k + 3)).eval();
+    }
+  }
+  double kinetic_energy() const {
+    double sum = 0;
+    for (int k = 0; k < count(); ++k) {
+      const Vector3d& w = spin(k);
+      sum += 0.5 * (inertia(k).mass * frame(k).v.squaredNorm() + w.dot(inertia(k).inertia * w));
+    }
+    return sum;
+  }
+  Vector3d momentum() const {
+    Vector3d sum = Vector3d::Zero();
+    for (int k = 0; k < count(); ++k) sum += inertia(k).mass * frame(k).v;
+    return sum;
+  }
+  /// about the origin
+  Vector3d angular_momentum() const {
+    Vector3d sum = Vector3d::Zero();
+    for (int k = 0; k < count(); ++k)
+      sum += inertia(k).mass * frame(k).x.cross(frame(k).v) +
+             frame(k).R * (inertia(k).inertia * spin(k));
+    return sum;
+  }
 
  private:
   Bodies bodies_;

@@ -183,8 +183,4 @@ void RowsInUse::choose_multipliers() {
   for (int i = 0; i < count_; ++i) carries_[at(order[at(i)])] = 1;
 }
 
-void RowsInUse::choose_after_step() {
-  if (--wait_ <= 0) choose();
-}
-
 }  // namespace tether::scene::smooth

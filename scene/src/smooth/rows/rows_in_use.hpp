@@ -25,29 +25,83 @@ class SparseJointGradient {
 
   /// At the state that is set. Rows that are not wanted count as zero; `dependent`: how short what
   /// others leave of a row of unit length, in the metric of M, is if it is to depend on them.
-  void factor();
-  void factor(const std::vector<char>& wanted, double dependent);
+  void factor() { factor(nullptr, 1e-6); }
+  // A factor of the tolerance that SparseMinimumNorm calls a row dependent at.
+  void factor(const std::vector<char>& wanted, double dependent) {
+    factor(wanted.data(), 0.25 * dependent);
+  }
   /// After factor(): 1 for each row that is wanted and depends on none of the others; their number.
-  int independent(std::vector<char>& rows) const;
+  int independent(std::vector<char>& rows) const {
+    rows.assign(at(rows_.count()), 1);
+    for (int k = factors_.rank(); k < rows_.count(); ++k) rows[at(factors_.pivot(k))] = 0;
+    return factors_.rank();
+  }
   /// After factor(): what rows before row i in the order of elimination leave of it, 0 to 1.
   double independent_part(int i) const { return factors_.independent_part(i); }
   /// After factor(): a row that depends on others, and those that matter in it; none: empty.
-  std::vector<int> dependent() const;
+  std::vector<int> dependent() const {
+    if (factors_.dropped() == 0) return {};
+    const int k = factors_.rank();
+    const std::vector<double> shares = factors_.dependence(k);
+    std::vector<int> rows = {factors_.pivot(k)};
+    double largest = 0;
+    const auto share = [&](int i) {
+      return std::abs(shares[at(i)]) * factors_.row_norm(factors_.pivot(i));
+    };
+    for (int i = 0; i < k; ++i) largest = std::max(largest, share(i));
+    for (int i = 0; i < k; ++i)
+      if (share(i) > 0.1 * largest) rows.push_back(factors_.pivot(i));
+    return rows;
+  }
   /// Finds a with G a = right of least kinetic energy a^T M a / 2, and lambda with M a = G^T
   /// lambda.
-  void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda);
+  void solve(const Eigen::VectorXd& right, Eigen::VectorXd& a, Eigen::VectorXd& lambda) {
+    factors_.solve(right.data(), least_.data());
+    factors_.multipliers(least_.data(), lambda.data());
+    a.setZero();
+    add_least(1.0, a);
+  }
   /// Takes from velocities v what the factored rows forbid.
-  void release(Eigen::VectorXd& v);
+  void release(Eigen::VectorXd& v) {
+    multiply(v, rates_);
+    factors_.solve(rates_.data(), least_.data());
+    add_least(-1.0, v);
+  }
   /// Product of G with each moving body's velocities.
-  void multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const;
+  void multiply(const Eigen::VectorXd& a, Eigen::VectorXd& rates) const {
+    rates.setZero();
+    each_entry([&](int row, int, int slot, const Vector3d& force, const Vector3d& torque) {
+      rates[row] += force.dot(a.segment<3>(6 * slot)) + torque.dot(a.segment<3>(6 * slot + 3));
+    });
+  }
   /// Diagonal of G M^-1 G^T; after factor().
-  Eigen::VectorXd size_of_rows() const;
+  Eigen::VectorXd size_of_rows() const {
+    Eigen::VectorXd size(rows_.count());
+    for (int i = 0; i < rows_.count(); ++i) size[i] = std::pow(factors_.row_norm(i), 2);
+    return size;
+  }
 
  private:
   void factor(const char* wanted, double rank_tolerance);
-  void add_least(double share, Eigen::VectorXd& a) const;  // share times the last solution
+  /// share times the last solution
+  void add_least(double share, Eigen::VectorXd& a) const {
+    for (int k = 0; k < bodies_.count(); ++k) {
+      a.segment<3>(6 * k) += share / std::sqrt(bodies_.inertia(k).mass) * least_.segment<3>(6 * k);
+      a.segment<3>(6 * k + 3) += share * (roots_[at(k)] * least_.segment<3>(6 * k + 3));
+    }
+  }
+  // put(row, where its entries of this body begin within the row, body's slot, force, torque)
   template <class Put>
-  void each_entry(const Put& put) const;
+  void each_entry(const Put& put) const {
+    const Bodies& bodies = bodies_.all();
+    rows_.each([&](const auto& row) {
+      JointRows::each_unit_load(
+          row, bodies, [&](int i, int body, const Vector3d& force, const Vector3d& torque) {
+            const int place = body == row.first ? row.place_first : row.place_second;
+            put(row.row + i, 6 * place, bodies.inertia[at(body)].slot, force, torque);
+          });
+    });
+  }
 
   const JointRows& rows_;
   const MovingBodies& bodies_;
@@ -82,14 +136,38 @@ class SparseRowChoice {
   bool keeps(int row) const { return kept_.has[at(row)] != 0; }
   const RowSet& carriers() const { return carriers_; }
   /// From which weakest pivot of the carriers on nothing is to be feared for some steps.
-  double good() const;
+  double good() const { return std::min(0.03, 0.3 * usual_); }
 
  private:
-  RowSet independent_among(const std::vector<char>& wanted, double dependent);
+  RowSet independent_among(const std::vector<char>& wanted, double dependent) {
+    gradient_.factor(wanted, dependent);
+    RowSet found;
+    found.count = gradient_.independent(found.has);
+    for (int i = 0; i < rows_.count(); ++i)
+      if (found.has[at(i)]) found.weakest = std::min(found.weakest, gradient_.independent_part(i));
+    return found;
+  }
   void add_thin(RowSet& set);
-  RowSet best(int count, double weak);
+  // The set of `count` rows that is furthest from depending on each other, to a factor of 10; at
+  // least to within `weak`. Fewer rows where there are not so many.
+  RowSet best(int count, double weak) {
+    for (double stands_out = 0.1; stands_out > weak; stands_out *= 0.1) {
+      RowSet found = independent_among(all_, stands_out);
+      if (found.count >= count) return found;
+    }
+    return independent_among(all_, weak);
+  }
   double reach() const;
-  void move(std::vector<double>& y, const Eigen::VectorXd& v) const;
+  // v: velocities of each body as in JointGradient.
+  void move(std::vector<double>& y, const Eigen::VectorXd& v) const {
+    for (int k = 0; k < bodies_.count(); ++k) {
+      double* s = y.data() + kBody * k;
+      Eigen::Map<Vector3d>(s + kPosition) += v.segment<3>(6 * k);
+      Eigen::Map<Eigen::Vector4d> q(s + kQuaternion);
+      q += quaternion_rate(s + kQuaternion, v.segment<3>(6 * k + 3));
+      q.normalize();
+    }
+  }
   void move_freely(std::vector<double>& y);
   void close(std::vector<double>& y);
 
@@ -131,7 +209,9 @@ class RowsInUse {
   /// Chooses at the state that is set, for this local tolerance from now on.
   void choose(double tolerance);
   /// After a step, at the state that is set. True: used() has other rows than before.
-  void choose_after_step();
+  void choose_after_step() {
+    if (--wait_ <= 0) choose();
+  }
   void choose_now() { choose(); }
 
  private:

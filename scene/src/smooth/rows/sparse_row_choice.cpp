@@ -95,15 +95,6 @@ void SparseRowChoice::add_thin(RowSet& set) {
   }
 }
 
-RowSet SparseRowChoice::independent_among(const std::vector<char>& wanted, double dependent) {
-  gradient_.factor(wanted, dependent);
-  RowSet found;
-  found.count = gradient_.independent(found.has);
-  for (int i = 0; i < rows_.count(); ++i)
-    if (found.has[at(i)]) found.weakest = std::min(found.weakest, gradient_.independent_part(i));
-  return found;
-}
-
 // Mean distance of bodies that a joint connects.
 double SparseRowChoice::reach() const {
   double sum = 0;
@@ -115,17 +106,6 @@ double SparseRowChoice::reach() const {
     ++count;
   });
   return count > 0 && sum > 0 ? sum / count : 1.0;
-}
-
-// v: velocities of each body as in JointGradient.
-void SparseRowChoice::move(std::vector<double>& y, const Eigen::VectorXd& v) const {
-  for (int k = 0; k < bodies_.count(); ++k) {
-    double* s = y.data() + kBody * k;
-    Eigen::Map<Vector3d>(s + kPosition) += v.segment<3>(6 * k);
-    Eigen::Map<Eigen::Vector4d> q(s + kQuaternion);
-    q += quaternion_rate(s + kQuaternion, v.segment<3>(6 * k + 3));
-    q.normalize();
-  }
 }
 
 // Along velocities without a pattern, less what the joints forbid; by the current factors.
@@ -154,18 +134,6 @@ void SparseRowChoice::close(std::vector<double>& y) {
     move(y, -v);
   }
 }
-
-// The set of `count` rows that is furthest from depending on each other, to a factor of 10; at
-// least to within `weak`. Fewer rows where there are not so many.
-RowSet SparseRowChoice::best(int count, double weak) {
-  for (double stands_out = 0.1; stands_out > weak; stands_out *= 0.1) {
-    RowSet found = independent_among(all_, stands_out);
-    if (found.count >= count) return found;
-  }
-  return independent_among(all_, weak);
-}
-
-double SparseRowChoice::good() const { return std::min(0.03, 0.3 * usual_); }
 
 // There are never more independent rows than a little way off the start: at loose tolerances bodies
 // are off the joints by more than rounding, and rows that are implied seem independent.
