@@ -482,3 +482,11 @@ TEST_CASE(
         }
       }
 }
+
+TEST_CASE(
+    "criterion: an open contact without friction has the natural map 0, also where it does not "
+    "slide") {
+  const Problem p =
+      Problem::dense(Eigen::Matrix3d::Identity(), Vector3d(-1, 0, 0), VectorXd::Zero(1));
+  for (Law law : kLaws) CHECK(evaluate(p, law, Vector3d::Zero()).natural_map == 0);
+}

@@ -161,12 +161,11 @@ class DeficientFactors final : public EquationFactors {
 
 void IslandEquations::multiply(const PackedVector* y, PackedVector* out) const {
   for (int i = 0; i < size(); ++i) {
-    PackedVector sum;
+    out[i] = {};
     for (int k = starts[at(i)]; k < starts[at(i + 1)]; ++k) {
       const double *M = blocks[at(k)].column, *v = y[columns[at(k)]].v;
-      for (int r = 0; r < 3; ++r) sum.v[r] += M[r] * v[0] + M[4 + r] * v[1] + M[8 + r] * v[2];
+      for (int r = 0; r < 3; ++r) out[i].v[r] += M[r] * v[0] + M[4 + r] * v[1] + M[8 + r] * v[2];
     }
-    out[i] = sum;
   }
 }
 

@@ -94,23 +94,20 @@ void SolutionDerivative::linearise(const DerivativeOptions& options) {
     if (!(margin > kink)) report_.kinks.push_back({i, t.regime, t.other, margin});
     if (t.regime == Regime::separating) continue;
     place_[at(i)] = static_cast<int>(relations_.size());
-    Relation& to = relations_.emplace_back();
     const double weight = system_.weight(i);
     for (int r = 0; r < 3; ++r) {
       double square = 0;
       for (int c = 0; c < 3; ++c) {
-        to.P[r][c] = t.P[r][c] / weight;
-        to.Q[r][c] = t.Q[r][c] * weight;
-        square += to.P[r][c] * to.P[r][c] + to.Q[r][c] * to.Q[r][c];
+        t.P[r][c] /= weight;
+        t.Q[r][c] *= weight;
+        square += t.P[r][c] * t.P[r][c] + t.Q[r][c] * t.Q[r][c];
       }
       const double f = square > 0 ? 1 / std::sqrt(square) : 0;
-      for (int c = 0; c < 3; ++c) {
-        to.P[r][c] *= f;
-        to.Q[r][c] *= f;
-      }
-      to.friction[r] = t.friction[r] * f;
-      for (int c = 0; c < 2; ++c) to.coupling[r][c] = t.coupling[r][c] * f;
+      for (int c = 0; c < 3; ++c) t.P[r][c] *= f, t.Q[r][c] *= f;
+      for (int c = 0; c < 2; ++c) t.coupling[r][c] *= f;
+      t.friction[r] *= f;
     }
+    relations_.push_back(t);
   }
 }
 
@@ -147,7 +144,7 @@ void SolutionDerivative::assemble(IslandEquations& island) const {
   island.blocks.assign(island.columns.size(), PackedBlock());
   for (int row = 0; row < island.size(); ++row) {
     const int i = island.contacts[at(row)];
-    const Relation& R = relations_[at(place_[at(i)])];
+    const LawTangent& R = relations_[at(place_[at(i)])];
     int from = p.row_start()[at(i)];
     for (int k = island.starts[at(row)]; k < island.starts[at(row + 1)]; ++k) {
       const int j = island.contacts[at(island.columns[at(k)])];
@@ -231,7 +228,7 @@ SolutionChange SolutionDerivative::forward(const DataChange& change) const {
     Packed y(island->contacts.size()), product(y.size());
     for (int k = 0; k < island->size(); ++k) {
       const int i = island->contacts[at(k)];
-      const Relation& R = relations_[at(place_[at(i)])];
+      const LawTangent& R = relations_[at(place_[at(i)])];
       for (int r = 0; r < 3; ++r) {
         double sum = R.friction[r] * change.mu[at(i)];
         for (int c = 0; c < 2; ++c) sum += R.coupling[r][c] * change.gamma[at(i)][at(c)];
@@ -271,7 +268,7 @@ DataChange SolutionDerivative::adjoint(const Packed& rows) const {
     island->factors->solve_transposed(y.data());
     for (int k = 0; k < island->size(); ++k) {
       const int i = island->contacts[at(k)];
-      const Relation& R = relations_[at(place_[at(i)])];
+      const LawTangent& R = relations_[at(place_[at(i)])];
       for (int r = 0; r < 3; ++r) {
         const double v = y[at(k)].v[r];
         out.mu[at(i)] -= R.friction[r] * v;

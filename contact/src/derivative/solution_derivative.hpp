@@ -72,10 +72,6 @@ class TETHER_HIDDEN SolutionDerivative {
   DataChange adjoint(const Packed& rows) const;
 
  private:
-  // The law's relation of a touching contact in scaled units: rows of length 1, y = weight dx.
-  struct Relation {
-    double P[3][3], Q[3][3], friction[3], coupling[3][2];
-  };
   void accept(const DerivativeOptions& options);
   void linearise(const DerivativeOptions& options);
   void collect_islands();
@@ -86,9 +82,9 @@ class TETHER_HIDDEN SolutionDerivative {
 
   Problem problem_;
   System system_;
-  Packed x_;                // in the units of system_
-  std::vector<int> place_;  // of touching contacts in relations_; -1: open
-  std::vector<Relation> relations_;
+  Packed x_;                           // in the units of system_
+  std::vector<int> place_;             // of touching contacts in relations_; -1: open
+  std::vector<LawTangent> relations_;  // in scaled units: rows of length 1, y = weight dx
   std::vector<std::unique_ptr<IslandEquations>> islands_;
   DerivativeReport report_;
 };

@@ -14,7 +14,7 @@ struct LawKernels;
 // one point and convex beyond. Above e = 0.8 there may be three, with sticking, and at b_n < 0
 // (jam) two: unless the one found is the only one, all are found and the one nearest to the present
 // impulse is taken.
-struct Coulomb {
+struct Coulomb : OppositeSlip {
   static constexpr Law kLaw = Law::coulomb;
   static constexpr const char* kName = "coulomb";
   static constexpr bool kFriction = true;
@@ -53,12 +53,6 @@ struct Coulomb {
     return slide(L, r, bn, l, x);
   }
 
-  // A null direction has a raised beta: nothing else is special about it.
-  static TETHER_INLINE bool solve_singular(const LocalBlock&, double, double, double, double*,
-                                           Regime&, int&) {
-    return false;
-  }
-  static TETHER_INLINE void gamma(const LocalBlock&, double* out) { out[0] = out[1] = 0; }
   static TETHER_INLINE void natural_point(const LocalBlock& L, const double* x, const double* w,
                                           double* v) {
     cone_natural_point(L.mu, 0, 0, x, w, v);

@@ -7,7 +7,7 @@ namespace tether::contact::detail {
 
 struct LawKernels;
 
-struct Frictionless {
+struct Frictionless : OppositeSlip {
   static constexpr Law kLaw = Law::frictionless;
   static constexpr const char* kName = "frictionless";
   static constexpr bool kFriction = false;
@@ -20,11 +20,6 @@ struct Frictionless {
     return bn > 0 ? Regime::sliding : Regime::separating;
   }
 
-  static TETHER_INLINE bool solve_singular(const LocalBlock&, double, double, double, double*,
-                                           Regime&, int&) {
-    return false;
-  }
-  static TETHER_INLINE void gamma(const LocalBlock&, double* out) { out[0] = out[1] = 0; }
   static TETHER_INLINE void natural_point(const LocalBlock&, const double* x, const double* w,
                                           double* v) {
     v[0] = x[0] - w[0] > 0 ? x[0] - w[0] : 0;

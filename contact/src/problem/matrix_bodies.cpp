@@ -79,6 +79,9 @@ class MatrixBodies {
     std::size_t eliminated = 0;
     MatrixXd G, left;
     bool takes_body = true;  // the others are not coupled by what is left
+    auto block(std::size_t r, std::size_t k) {
+      return left.block(start[r], start[k], start[r + 1] - start[r], start[k + 1] - start[k]);
+    }
   };
 
   void find_classes() {
@@ -183,9 +186,7 @@ class MatrixBodies {
     for (std::size_t r = turn.eliminated; r < turn.classes.size(); ++r)
       for (std::size_t k = turn.eliminated; k < turn.classes.size(); ++k) {
         if (r == k) continue;
-        auto block =
-            turn.left.block(turn.start[r], turn.start[k], turn.start[r + 1] - turn.start[r],
-                            turn.start[k + 1] - turn.start[k]);
+        auto block = turn.block(r, k);
         if (block.cwiseAbs().maxCoeff() > std::sqrt(kRank) * std::sqrt(size(r) * size(k)))
           turn.takes_body = false;
         else
@@ -216,9 +217,7 @@ class MatrixBodies {
     for (std::size_t r = turn.eliminated; r < turn.classes.size(); ++r) {
       Class& c = classes_[at(turn.classes[r])];
       for (std::size_t k = turn.eliminated; k < turn.classes.size(); ++k) {
-        const auto block =
-            turn.left.block(turn.start[r], turn.start[k], turn.start[r + 1] - turn.start[r],
-                            turn.start[k + 1] - turn.start[k]);
+        const auto block = turn.block(r, k);
         if (r != k && (block.array() == 0).all())
           c.left.erase(turn.classes[k]);
         else

@@ -112,6 +112,10 @@ class System {
 
   // gamma of contact i in its own frame: slip is opposite to x_t / |x_t| + gamma.
   void gamma(int i, double* out) const { law_of(i).gamma(problem_->local(i), out); }
+  // v: the point of the natural map of contact i at x, w.
+  void natural_point(int i, const PackedVector& x, const PackedVector& w, double* v) const {
+    law_of(i).natural_point(problem_->local(i), x.v, w.v, v);
+  }
   // The linearised law of contact i at the solution x, w.
   void tangent(int i, const PackedVector& x, const PackedVector& w, LawTangent& out) const {
     law_of(i).tangent(problem_->local(i), x.v, w.v, out);

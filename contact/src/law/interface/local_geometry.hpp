@@ -134,6 +134,16 @@ inline void cone_derivative(const LocalBlock& L, double bn, double b0, double b1
   derivative_sticking(L, out);
 }
 
+/// Parts of a law whose slip is opposite to friction. Null directions of a block have a raised
+/// beta: nothing else is special about them.
+struct OppositeSlip {
+  static TETHER_INLINE bool solve_singular(const LocalBlock&, double, double, double, double*,
+                                           Regime&, int&) {
+    return false;
+  }
+  static TETHER_INLINE void gamma(const LocalBlock&, double* out) { out[0] = out[1] = 0; }
+};
+
 /// At a solution (x, w) of one contact, on the branch of the regime:
 ///
 ///     P dx + Q dw + friction dmu + coupling dgamma = 0,

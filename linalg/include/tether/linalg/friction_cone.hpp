@@ -10,11 +10,11 @@ namespace tether::linalg {
 /// v <- its nearest point (Euclid) of the cone |v_t| <= mu v_n, mu >= 0; three entries.
 TETHER_INLINE void project_cone(double mu, double* v) {
   const double t = std::sqrt(v[1] * v[1] + v[2] * v[2]);
-  if (t <= mu * v[0]) return;
   if (mu * t <= -v[0]) {
     v[0] = v[1] = v[2] = 0;
     return;
   }
+  if (t <= mu * v[0]) return;
   const double n = (v[0] + mu * t) / (1 + mu * mu), f = t > 0 ? mu * n / t : 0;
   v[0] = n;
   v[1] *= f;

@@ -1,6 +1,7 @@
 // Tether: the path of interior points by its arclength. SPDX-License-Identifier: BSD-3-Clause
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <tether/linalg/cone_scaling.hpp>
@@ -40,10 +41,7 @@ class SmoothedPairs {
   double largest(const Packed& change) const;
 
  private:
-  struct Parts {
-    double v[3];
-  };
-  Parts parts(int i, const double* change) const;
+  std::array<double, 3> parts(int i, const double* change) const;
 
   const InteriorEquations& equations_;
   std::vector<double> rho_;
@@ -129,34 +127,32 @@ void SmoothedPairs::change_of(const ConePair& pair, Packed& out) const {
     for (int c = 0; c < 3; ++c) out[i].v[c] = pair.x[i].v[c] - rho_[i] * pair.u[i].v[c];
 }
 
-SmoothedPairs::Parts SmoothedPairs::parts(int i, const double* d) const {
+std::array<double, 3> SmoothedPairs::parts(int i, const double* d) const {
   const double q = 4 * rho_[at(i)] * nu();
   const double* v = at_.z[at(i)].v;
-  if (equations_.flat(i)) return {{d[0] / std::sqrt(v[0] * v[0] + q), 0, 0}};
+  if (equations_.flat(i)) return {d[0] / std::sqrt(v[0] * v[0] + q), 0, 0};
   const Spectrum z(v);
   const double along = z.t[0] * d[1] + z.t[1] * d[2], across = z.t[0] * d[2] - z.t[1] * d[1];
   // Inside of a cone directions do not matter, and the distance from it takes the place of |z_t|.
   const double inside = std::max({z.below, -z.above, 0.0});
-  return {{(d[0] + along) / std::sqrt(z.above * z.above + q),
-           (d[0] - along) / std::sqrt(z.below * z.below + q),
-           across / std::sqrt(z.length * z.length + inside * inside + q)}};
+  return {(d[0] + along) / std::sqrt(z.above * z.above + q),
+          (d[0] - along) / std::sqrt(z.below * z.below + q),
+          across / std::sqrt(z.length * z.length + inside * inside + q)};
 }
 
 double SmoothedPairs::inner(const Packed& a, const Packed& b) const {
   double sum = 0;
   for (std::size_t i = 0; i < rho_.size(); ++i) {
-    const Parts p = parts(static_cast<int>(i), a[i].v), r = parts(static_cast<int>(i), b[i].v);
-    for (int c = 0; c < 3; ++c) sum += p.v[c] * r.v[c];
+    const auto p = parts(static_cast<int>(i), a[i].v), r = parts(static_cast<int>(i), b[i].v);
+    for (std::size_t c = 0; c < 3; ++c) sum += p[c] * r[c];
   }
   return sum;
 }
 
 double SmoothedPairs::largest(const Packed& change) const {
   double most = 0;
-  for (std::size_t i = 0; i < rho_.size(); ++i) {
-    const Parts p = parts(static_cast<int>(i), change[i].v);
-    for (double v : p.v) most = std::max(most, std::abs(v));
-  }
+  for (std::size_t i = 0; i < rho_.size(); ++i)
+    for (double v : parts(static_cast<int>(i), change[i].v)) most = std::max(most, std::abs(v));
   return most;
 }
 
@@ -170,14 +166,9 @@ struct InteriorPoint::ArclengthPath {
     rate.resize(at(of.n_));
   }
 
-  struct Tangent {
-    Packed z;
-    double log_nu = 0;
-  };
-  // A point near the curve, with its tangent.
+  // A point near the curve, and its tangent.
   struct Point {
-    SmoothedPairs::Place place;
-    Tangent tangent;
+    SmoothedPairs::Place place, tangent;
   };
 
   InteriorPoint& own;
@@ -186,7 +177,7 @@ struct InteriorPoint::ArclengthPath {
   double step = 0.5;    // in parts of what changes the first contact's regime
   Packed newton, rate;  // to the curve, with newton_log_nu; d / d log nu along it
   double newton_log_nu = 0;
-  Tangent tangent;
+  SmoothedPairs::Place tangent;
   Point last;
 
   void evaluate() {
@@ -199,9 +190,9 @@ struct InteriorPoint::ArclengthPath {
     const System& system = search.system;
     const double nu = pairs.nu();
     if (!own.newton_.factor(search, own.equations_, own.point_)) return false;
-    own.newton_.plain_direction(system, own.equations_, nu);
+    own.newton_.direction(system, own.equations_, nu, false, 0);
     pairs.change_of(own.newton_.change(), newton);
-    own.newton_.plain_direction(system, own.equations_, 2 * nu);
+    own.newton_.direction(system, own.equations_, 2 * nu, false, 0);
     pairs.change_of(own.newton_.change(), rate);
     entries(rate) -= entries(newton);
     const double square = pairs.inner(rate, rate) + 1;
@@ -222,7 +213,7 @@ struct InteriorPoint::ArclengthPath {
     return 1 / std::max(pairs.largest(newton), std::abs(newton_log_nu) / kLogNu);
   }
 
-  void go_along(const Tangent& along) {
+  void go_along(const SmoothedPairs::Place& along) {
     constexpr double kMostFall = 4.6, kMostRise = 2;  // of log nu
     double length = step / pairs.largest(along.z);
     if (along.log_nu < 0) length = std::min(length, kMostFall / -along.log_nu);

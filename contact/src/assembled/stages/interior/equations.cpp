@@ -61,16 +61,8 @@ double InteriorEquations::natural_map(const System& system) const {
   double sum = 0;
   for (int i = 0; i < n_; ++i) {
     const double* z = z_[at(i)].v;
-    const double* w = w_[at(i)].v;
-    double v[3] = {std::max(z[0] - w[0], 0.0), 0, 0};
-    if (!flat_[at(i)]) {
-      double gamma[2];
-      system.gamma(i, gamma);
-      const double mu = system.problem().local(i).mu, s = slip(w[1], w[2], gamma[0], gamma[1]);
-      v[0] = z[0] - w[0] - mu * s;
-      for (int c = 1; c < 3; ++c) v[c] = z[c] - w[c] - s * gamma[c - 1];
-      project_cone(mu, v);
-    }
+    double v[3];
+    system.natural_point(i, z_[at(i)], w_[at(i)], v);
     for (int c = 0; c < 3; ++c) sum += (z[c] - v[c]) * (z[c] - v[c]);
   }
   return std::sqrt(sum);

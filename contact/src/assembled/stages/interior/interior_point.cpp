@@ -44,10 +44,10 @@ bool InteriorPoint::start(Search& search) {
   if (!(speed > 0)) return false;
   stick(search);
   if (search.solved() || !sticking_.found()) return false;
+  point_.x = sticking_.point();
   for (int i = 0; i < n_; ++i) {
     double* x = point_.x[at(i)].v;
     double* u = point_.u[at(i)].v;
-    for (int c = 0; c < 3; ++c) x[c] = sticking_.point()[at(i)].v[c];
     x[0] += sticking_.outside() +
             0.1 * std::max(sticking_.size() / n_, speed / mean_diagonal(system.problem().local(i)));
     x[3] = x[0] - tangent(x);
@@ -60,7 +60,7 @@ bool InteriorPoint::start(Search& search) {
 
 // x and the u that belongs to its velocity, both kept off the cone as far as x.u = nu asks for,
 // nu = near * (mean size of x) * (mean size of u).
-bool InteriorPoint::place_near(Search& search, const PackedVector* start, double near) {
+bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near, double tau) {
   System& system = search.system;
   const Problem& p = system.problem();
   velocities(p, false, start, swept_.data());
@@ -101,18 +101,6 @@ bool InteriorPoint::place_near(Search& search, const PackedVector* start, double
     x[0] = x[3] + tangent(x);
     u[0] = u[3] + tangent(u);
   }
-  return true;
-}
-
-bool InteriorPoint::start_near(Search& search, const PackedVector* start, double near) {
-  if (!place_near(search, start, near)) return false;
-  equations_.evaluate(search, point_);
-  return true;
-}
-
-// Near the anchor, in the proximal problem around it.
-bool InteriorPoint::start_proximal(Search& search, double tau, double near) {
-  if (!place_near(search, equations_.anchor().data(), near)) return false;
   equations_.set_tau(tau);
   equations_.evaluate(search, point_);
   return true;
@@ -210,7 +198,7 @@ void InteriorPoint::run_proximal(Search& search, const PackedVector* x, int most
       // iteration is no better, with more steps each.
       equations_.set_tau(0);
       const double before = equations_.natural_map(search, anchor.data());
-      if (!start_proximal(search, tau, kNear)) break;
+      if (!start_near(search, anchor.data(), kNear, tau)) break;
       found = follow(search, kSteps, 0.5 * before) <= 0.8 * before;
       equations_.set_tau(0);
       search.test(equations_.impulses().data(), By::factors);

@@ -14,7 +14,6 @@ class StickingPoint {
   void reset(int contacts);
   /// Once for a problem: one factorisation and tests. `flat`: contacts without friction.
   void find(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat);
-  bool tried() const { return state_ != State::unknown; }
   bool found() const { return state_ == State::found; }
   /// In the frame where the cone is its own dual, (mu x_n, x_t).
   const Packed& point() const { return x_; }
@@ -63,10 +62,9 @@ class InteriorPoint {
  private:
   struct ArclengthPath;
   bool start(Search& search);
-  bool start_near(Search& search, const PackedVector* start, double near);
-  bool start_proximal(Search& search, double tau, double near);
-  // Puts point_ near an answer; false: there is nothing to scale it by.
-  bool place_near(Search& search, const PackedVector* start, double near);
+  // Puts point_ near an answer, in the proximal problem around it where tau > 0; false: there is
+  // nothing to scale it by.
+  bool start_near(Search& search, const PackedVector* start, double near, double tau = 0);
   // Steps until nothing is gained or, for a proximal problem, until its natural map is <= target;
   // returns that map.
   double follow(Search& search, int most, double target);

@@ -176,26 +176,18 @@ double InteriorNewton::expand(const System& system, const InteriorEquations& equ
 
 // Newton direction towards x o u = centre e, refined where it has lost digits.
 void InteriorNewton::direction(const System& system, const InteriorEquations& equations,
-                               double centre, bool corrected) {
+                               double centre, bool corrected, int refinements) {
   constexpr double kRefine = 1e-6;
-  constexpr int kRefinements = 3;
   aim(equations, centre, corrected);
   matrix_.solve(step_.data());
   double defect = expand(system, equations);
-  for (int k = 0; k < kRefinements && defect > kRefine; ++k) {
+  for (int k = 0; k < refinements && defect > kRefine; ++k) {
     matrix_.solve(defect_.data());
     entries(step_) += entries(defect_);
     const double before = defect;
     defect = expand(system, equations);
     if (!(defect < 0.5 * before)) break;
   }
-}
-
-void InteriorNewton::plain_direction(const System& system, const InteriorEquations& equations,
-                                     double centre) {
-  aim(equations, centre, false);
-  matrix_.solve(step_.data());
-  expand(system, equations);
 }
 
 void InteriorNewton::keep_predictor() {

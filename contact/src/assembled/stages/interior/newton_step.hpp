@@ -86,11 +86,9 @@ class InteriorNewton {
   /// At a point; false: it has reached its cone, or the matrix is singular.
   bool factor(Search& search, const InteriorEquations& equations, const ConePair& point);
   /// Towards x o u = centre e, with the residual of `equations`; corrected: with the second-order
-  /// term of the predictor.
+  /// term of the predictor. Without refinements: as the matrix has it, with its shift.
   void direction(const System& system, const InteriorEquations& equations, double centre,
-                 bool corrected);
-  /// Towards x o u = centre e as the matrix has it, with its shift, not refined.
-  void plain_direction(const System& system, const InteriorEquations& equations, double centre);
+                 bool corrected, int refinements = 3);
   /// The last direction is the predictor.
   void keep_predictor();
   /// The step along the last direction at which the point reaches a cone.

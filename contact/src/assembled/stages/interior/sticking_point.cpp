@@ -30,17 +30,17 @@ bool StickingPoint::factor(Search& search, NewtonMatrix& matrix) const {
 }
 
 void StickingPoint::find(Search& search, NewtonMatrix& matrix, const std::vector<char>& flat) {
-  if (tried()) return;
+  if (state_ != State::unknown) return;
   state_ = State::none;
   const Problem& p = search.system.problem();
   const int n = p.contacts();
   if (!factor(search, matrix)) return;
   z_ = p.packed_b();
   matrix.solve(z_.data());
+  x_ = z_;
   size_ = outside_ = 0;
   for (int i = 0; i < n; ++i) {
     double* x = x_[at(i)].v;
-    for (int c = 0; c < 3; ++c) x[c] = z_[at(i)].v[c];
     if (flat[at(i)]) {
       x[1] = x[2] = 0;
     } else {
