@@ -1,9 +1,8 @@
 // Tether: rows that are spread over processes (method, eq. 21). SPDX-License-Identifier:
 // BSD-3-Clause
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tether/linalg/index.hpp>
 #include <tether/linalg/sparse_minimum_norm.hpp>
 
 #include "host/rounding.hpp"
@@ -13,10 +12,6 @@
 namespace tether::ida_projection {
 
 namespace {
-
-using linalg::at;
-
-constexpr int kPatience = 20;
 
 // Outcomes by severity, so that the worst one is the largest.
 constexpr Status kOutcomes[] = {Status::success, Status::callback_recoverable, Status::not_finite,
@@ -59,16 +54,13 @@ class DistributedStore {
         m_(constraints.count),
         joined_(joined_to(constraints)),
         full_(joined_, uncounted_, like, report),
-        place_(given_.columns.size()),
-        entries_(given_.columns.size(), 0.0),
-        y_(at(n_ + ghosts_), 0.0),
+        C_(m_, n_ + ghosts_),
+        entries_(given_.columns.size()),
+        y_(n_ + ghosts_),
         D_(y_),
         v_(y_),
-        dy_(y_),
-        g_(at(m_), 0.0),
-        linear_(g_),
-        terms_(g_),
-        norm_(g_),
+        dy_(Eigen::VectorXd::Zero(y_.size())),
+        g_(Eigen::VectorXd::Zero(m_)),
         ones_(like),
         signal_(like),
         r_(like),
@@ -79,14 +71,14 @@ class DistributedStore {
     N_VConst(1.0, ones_);
     for (std::size_t k = 0; k < full_.g.size(); ++k) rows_.emplace_back(like);
     may_be_left_.resize(rows_.size());
-    std::iota(place_.begin(), place_.end(), 0);
-    std::vector<int> columns(place_.size());
+    std::vector<Eigen::Triplet<double>> numbers;
     for (int i = 0; i < m_; ++i)
-      std::sort(place_.begin() + given_.starts[at(i)], place_.begin() + given_.starts[at(i + 1)],
-                [this](int a, int b) { return given_.columns[at(a)] < given_.columns[at(b)]; });
-    std::transform(place_.begin(), place_.end(), columns.begin(),
-                   [this](int e) { return given_.columns[at(e)]; });
-    if (m_ > 0) solver_.resize(n_ + ghosts_, given_.starts, std::move(columns), 0);
+      for (int e = given_.starts[index(i)]; e < given_.starts[index(i + 1)]; ++e)
+        numbers.emplace_back(i, given_.columns[index(e)], e);
+    C_.setFromTriplets(numbers.begin(), numbers.end());
+    place_.assign(C_.valuePtr(), C_.valuePtr() + C_.nonZeros());
+    const int* columns = C_.innerIndexPtr();
+    if (m_ > 0) solver_.resize(n_ + ghosts_, given_.starts, {columns, columns + C_.nonZeros()}, 0);
   }
 
   Status value(double t, N_Vector y) {
@@ -98,28 +90,26 @@ class DistributedStore {
           return constraints_.value(t, ConstVector(y_.data(), n_ + ghosts_), Vector(to, m_));
         });
       });
-    double drift = 0.0;
-    for (int i = 0; i < m_ && own_outcome_ == Status::success; ++i) {
-      if (!std::isfinite(g_[at(i)])) {
+    for (int i = 0; i < m_ && own_outcome_ == Status::success; ++i)
+      if (!std::isfinite(g_[i])) {
         own_outcome_ = Status::not_finite;
         own_.text = "g of " + constraints_.name(i) + " is not finite";
       }
-      drift = std::max(drift, std::abs(g_[at(i)]));
-    }
     const Status outcome = agree();
     if (outcome != Status::success) return outcome;
-    drift_ = largest(drift);
+    drift_ = largest(g_.lpNorm<Eigen::Infinity>());
     return rows_.empty() ? outcome : full_.value(t, y);
   }
   Status fill(double t, N_Vector y) {
     ++statistics_.jacobian_evaluations;
     load(y, y_);
-    std::fill(entries_.begin(), entries_.end(), 0.0);
+    entries_.setZero();
     if (m_ > 0)
       call("DistributedRows::fill", [&] {
         return given_.fill(t, ConstVector(y_.data(), n_ + ghosts_),
                            Vector(entries_.data(), entries_.size()));
       });
+    for (std::size_t e = 0; e < place_.size(); ++e) C_.valuePtr()[e] = entries_[place_[e]];
     const Status outcome = agree();
     return outcome != Status::success || rows_.empty() ? outcome : full_.fill(t, y);
   }
@@ -128,21 +118,12 @@ class DistributedStore {
     coupled_ = largest(ghosts_) > 0.0 || !rows_.empty();
     load(metric.WT(), v_);
     load(metric.D(), D_);
-    for (int i = 0; i < m_; ++i) {
-      double sum = 0.0, terms = 0.0;
-      for (int e = given_.starts[at(i)]; e < given_.starts[at(i + 1)]; ++e) {
-        const std::size_t j = at(given_.columns[at(e)]);
-        sum += entries_[at(e)] * v_[j] * (entries_[at(e)] * v_[j]);
-        terms += std::abs(entries_[at(e)] * y_[j]);
-      }
-      norm_[at(i)] = std::sqrt(sum);
-      terms_[at(i)] = terms;
-    }
+    norm_ = (C_.cwiseAbs2() * v_.cwiseAbs2()).cwiseSqrt();
+    terms_ = C_.cwiseAbs() * y_.cwiseAbs();
     bool whole = true;
     if (m_ > 0) {
-      double* to = solver_.entries();
-      for (std::size_t e = 0; e < place_.size(); ++e) to[e] = entries_[at(place_[e])];
-      std::copy(D_.begin(), D_.end(), solver_.metric());
+      std::copy_n(C_.valuePtr(), C_.nonZeros(), solver_.entries());
+      std::copy_n(D_.data(), D_.size(), solver_.metric());
       if (!solver_.factor()) {
         own_outcome_ = Status::not_finite;
         own_.text = "the entries of C are not finite";
@@ -176,16 +157,13 @@ class DistributedStore {
   /// After fill().
   bool contains_algebraic(N_Vector id) {
     load(id, v_);
-    bool found = false;
-    for (std::size_t e = 0; e < entries_.size(); ++e)
-      found |= entries_[e] != 0.0 && v_[at(given_.columns[e])] == 0.0;
-    return largest(found ? 1.0 : 0.0) > 0.0 || full_.contains_algebraic(id);
+    linear_ = C_.cwiseAbs() * (1.0 - v_.array()).matrix();
+    return largest(linear_.lpNorm<Eigen::Infinity>()) > 0.0 || full_.contains_algebraic(id);
   }
   bool whole() const { return whole_; }
   bool rounding_only() {
-    bool more = false;
-    for (int i = 0; i < m_; ++i) more |= !(std::abs(g_[at(i)]) <= kRoundingOfTerms * terms_[at(i)]);
-    return largest(more ? 1.0 : 0.0) == 0.0 && full_.rounding_only();
+    const bool only = (g_.array().abs() <= kRoundingOfTerms * terms_.array()).all();
+    return largest(only ? 0.0 : 1.0) == 0.0 && full_.rounding_only();
   }
   /// Whether rows ask for more than half a tolerance beyond dy.
   bool contradict(N_Vector dy) {
@@ -198,11 +176,10 @@ class DistributedStore {
     load(dy, v_);
     const double share = kContradicts * std::sqrt(static_cast<double>(N_VGetLength(dy)));
     std::vector<int> found;
-    for (int i = 0; i < m_; ++i) {
-      const double beyond = std::abs(g_[at(i)] - times(i, v_));
-      if (!(beyond <= share * norm_[at(i)] + 1e2 * kEpsilon * (norm_[at(i)] + terms_[at(i)])))
+    linear_ = (g_ - C_ * v_).cwiseAbs();
+    for (int i = 0; i < m_; ++i)
+      if (!(linear_[i] <= share * norm_[i] + 1e2 * kEpsilon * (norm_[i] + terms_[i])))
         found.push_back(i);
-    }
     if (largest(found.empty() ? 0.0 : 1.0) == 0.0) return false;
     report_.text = "rows of another process contradict each other";
     if (!found.empty()) report_.contradicting(std::move(found), constraints_);
@@ -210,8 +187,7 @@ class DistributedStore {
   }
 
  private:
-  using Numbers = std::vector<double>;  // of this process's unknowns, and of its ghosts behind them
-
+  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   // Calls a function of the caller's; what goes wrong is told by agree().
   template <class Function>
   void call(const char* what, Function function) {
@@ -220,8 +196,8 @@ class DistributedStore {
     if (flag != 0 && own_outcome_ != Status::callback_fatal)
       own_outcome_ = own_.failed(flag, what, thrown, m_);
   }
-  void load(N_Vector from, Numbers& to) {
-    std::copy_n(N_VGetArrayPointer(from), n_, to.begin());
+  void load(N_Vector from, Eigen::VectorXd& to) {
+    std::copy_n(N_VGetArrayPointer(from), n_, to.data());
     if (!given_.update_ghosts) return;
     Vector copies(to.data() + n_, ghosts_);
     call("DistributedRows::update_ghosts",
@@ -246,16 +222,10 @@ class DistributedStore {
     own_ = RowsReport();
     return outcome;
   }
-  double times(int row, const Numbers& v) const {
-    double sum = 0.0;
-    for (int e = given_.starts[at(row)]; e < given_.starts[at(row + 1)]; ++e)
-      sum += entries_[at(e)] * v[at(given_.columns[at(e)])];
-    return sum;
-  }
   void project(N_Vector v, N_Vector Hv) {
     load(v, v_);
-    for (std::size_t j = 0; j < v_.size(); ++j) v_[j] *= D_[j];
-    for (int i = 0; i < m_; ++i) linear_[at(i)] = times(i, v_);
+    v_.array() *= D_.array();
+    linear_.noalias() = C_ * v_;
     shortest(Hv);
     full_.rows.add_part(v, Hv);
   }
@@ -267,11 +237,9 @@ class DistributedStore {
       solver_.one_step(linear_.data(), dy_.data());
     else if (m_ > 0)
       solver_.solve(linear_.data(), dy_.data());
-    else
-      std::fill(dy_.begin(), dy_.end(), 0.0);
-    for (std::size_t j = 0; j < dy_.size(); ++j) dy_[j] = D_[j] > 0.0 ? dy_[j] / D_[j] : 0.0;
+    dy_ = (D_.array() > 0.0).select(dy_.array() / D_.array(), 0.0);
     double* entries = N_VGetArrayPointer(to);
-    std::copy_n(dy_.begin(), n_, entries);
+    std::copy_n(dy_.data(), n_, entries);
     if (!given_.add_ghosts) return;
     const ConstVector copies(dy_.data() + n_, ghosts_);
     call("DistributedRows::add_ghosts",
@@ -285,8 +253,6 @@ class DistributedStore {
     N_VConst(0.0, u_);
     double size = N_VDotProd(r_, r_);
     const double first = size;
-    double least = size;
-    int since_least = 0;
     constexpr double kSolved = linalg::SparseMinimumNorm::kSolved;
     for (int k = 0; k < 300 && size > kSolved * kSolved * first; ++k) {
       project(p_, q_);
@@ -297,9 +263,6 @@ class DistributedStore {
       const double next = N_VDotProd(r_, r_);
       N_VLinearSum(1.0, r_, next / size, p_, p_);
       size = next;
-      since_least = size < least ? 0 : since_least + 1;
-      least = std::min(least, size);
-      if (!std::isfinite(size) || since_least > kPatience) break;
     }
     return first > 0.0 ? std::sqrt(size / first) : 0.0;
   }
@@ -313,18 +276,20 @@ class DistributedStore {
   int n_, ghosts_, m_;
   linalg::SparseMinimumNorm solver_;
   Constraints joined_;
-  Statistics uncounted_;             // of full rows: whoever asks for C counts
-  GradientStore full_;               // the joined ones
-  std::vector<OwnedVector> rows_;    // their gradients
-  std::vector<double> may_be_left_;  // of each of them, without a contradiction
-  std::vector<int> place_;  // of each entry of the solver: the caller's, whose order is free
-  Numbers entries_, y_, D_, v_, dy_;
-  Numbers g_, linear_;  // g, and C v
+  Statistics uncounted_;                            // of full rows: whoever asks for C counts
+  GradientStore full_;                              // the joined ones
+  std::vector<OwnedVector> rows_;                   // their gradients
+  std::vector<double> may_be_left_;                 // of each of them, without a contradiction
+  Eigen::SparseMatrix<double, Eigen::RowMajor> C_;  // of this process, ghosts last
+  std::vector<int> place_;          // of each entry of C_: the caller's, whose order is free
+  Eigen::VectorXd entries_;         // as the caller orders them
+  Eigen::VectorXd y_, D_, v_, dy_;  // of this process's unknowns, and of its ghosts behind them
+  Eigen::VectorXd g_, linear_;      // g, and C v
+  Eigen::VectorXd terms_, norm_;    // sum_j |C_ij y_j|, |row_i(C WT)|
   GuardedRoom room_;
-  Numbers terms_, norm_;                       // sum_j |C_ij y_j|, |row_i(C WT)|
   OwnedVector ones_, signal_, r_, p_, q_, u_;  // signal_: 0 but for the first entry of each process
   double drift_ = 0.0;
-  bool whole_ = false, coupled_ = false;  // coupled_: some process has ghosts
+  bool whole_ = false, coupled_ = false;  // coupled_: there are ghosts or full rows
 };
 
 }  // namespace

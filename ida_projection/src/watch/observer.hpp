@@ -167,7 +167,6 @@ class Observer {
   using Clock = std::chrono::steady_clock;
   static constexpr long kWindow = 200;  // accepted steps, in which most attempts fail
   static constexpr long kMostMovedByFalseRow = 5 * kWindow;  // steps, before such a run ends
-  static constexpr double kPartInTest = 0.5;  // tolerances: shorter moves fail no error test
 
   struct Run {
     OwnedVector start;         // its first y, of contiguous vectors
@@ -200,7 +199,7 @@ class Observer {
     N_VLinearSum(1.0, candidate.base, -ida_.step_size(), ida_.step().yp_predicted, y);
   }
   void count_rejections(const Attempt& attempt) {
-    const bool moved = run_.moved > kPartInTest;
+    const bool moved = run_.moved > 0.5;  // tolerances: shorter moves fail no error test
     if (attempt.repeated) {
       if (moved && std::exchange(run_.last_refused, attempt.steps) != attempt.steps)
         ++run_.refused_steps;

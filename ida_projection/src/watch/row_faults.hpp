@@ -182,7 +182,6 @@ class RowFaults {
   // some direction, and not to the other. Hosts that switch rows off have many that vanish; all are
   // tested together, along two directions of no structure.
   std::string find_one_sided_row(double t) {
-    constexpr double kReach = 1e-4, kDiffer = 0.1;  // of y; of the slopes
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < tangency_.tolerance.size(); ++i)
       if (tangency_.tolerance[i] == 0.0 && ++run_.rows[i].vanished == kSeen) rows.push_back(i);
@@ -190,14 +189,15 @@ class RowFaults {
     for (const double turn : {3.7, 1.3}) {
       for (const int side : {0, 1}) {
         for (std::size_t j = 0; j < moved_.size(); ++j)
-          moved_[j] = point_[j] + (1 - 2 * side) * kReach * std::max(1.0, std::abs(point_[j])) *
+          moved_[j] = point_[j] + (1 - 2 * side) * kWideIncrement *
+                                      std::max(1.0, std::abs(point_[j])) *
                                       std::sin(1.0 + turn * static_cast<double>(j));
         if (!value(t, moved_, sides_[side])) return {};
       }
       for (const std::size_t i : rows) {
         const double ahead = std::abs(sides_[0][i] - here_[i]);
         const double behind = std::abs(sides_[1][i] - here_[i]);
-        if (ahead != behind && std::min(ahead, behind) <= kDiffer * std::max(ahead, behind))
+        if (ahead != behind && 10.0 * std::min(ahead, behind) <= std::max(ahead, behind))
           return name_of(i) +
                  " and its gradient vanish to one side of the set; its slopes to both sides differ "
                  "there: a row with |.| or max has no derivative on the set, write it without";
