@@ -22,6 +22,11 @@ constexpr double kExpensive = 30;
 
 constexpr double kGain = 0.7;  // a stage that leaves more than this part of the error has stalled
 
+constexpr double kShare = 0.1;  // of the work before, for solves of parts
+
+// Proximal problems where impulses have far to go: heavy bodies on light ones, wedged contacts.
+constexpr int kFarProblems = 60;
+
 // The slip is differentiable at every contact.
 bool is_regular(const System& system) {
   for (int i = 0; i < system.size(); ++i) {
@@ -145,7 +150,6 @@ bool Automatic::order_after_sweeps(Search& search) {
 // Sweeps take turns with solves of the parts in which they do not settle, until the work `until` is
 // done. Solves that do not reduce the error become rarer.
 void Automatic::sweep_and_solve_parts(Search& search, double until) {
-  constexpr double kCheap = 0.1, kPartShare = 0.1;                    // of the work before
   constexpr double kBetween = 50, kMostBetween = 400, kGrowth = 1.4;  // sweeps
   const double begin = search.counts.work;
   double in_parts = 0, halved = search.best_error, between = kBetween;
@@ -156,7 +160,7 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
     leave.most_work = until - search.counts.work;
     sweeps_.run(search, leave);
     if (search.solved()) return;
-    if (search.best_error < 0.7 * halved) {
+    if (search.best_error < kGain * halved) {
       halved = search.best_error;
       in_parts = 0;
       between = kBetween;
@@ -164,9 +168,9 @@ void Automatic::sweep_and_solve_parts(Search& search, double until) {
     }
     const double before = search.counts.work;
     x_.assign(sweeps_.point(), sweeps_.point() + contacts_);
-    const bool changed = parts_.run(search, x_, kPartShare * before);
+    const bool changed = parts_.run(search, x_, kShare * before);
     in_parts += search.counts.work - before;
-    if (!changed || in_parts > kCheap * (before - begin))
+    if (!changed || in_parts > kShare * (before - begin))
       between = std::min(kMostBetween, kGrowth * between);
     if (!changed) continue;
     search.test(x_.data(), By::sweeps);
@@ -221,11 +225,11 @@ void Automatic::interior_points(Search& search, bool by_bodies) {
 // go, and more problems are allowed.
 void Automatic::proximal_path_at_best(Search& search) {
   constexpr double kRough = 1e-2;
-  constexpr int kProblems = 20, kMost = 60;
+  constexpr int kProblems = 20;
   if (search.best_error > kRough) return;
   x_ = search.best;
   const bool loaded = search.system.load(x_.data()) > kOrdinaryLoad;
-  interior_.run_proximal(search, x_.data(), loaded ? kMost : kProblems, newton_, loaded);
+  interior_.run_proximal(search, x_.data(), loaded ? kFarProblems : kProblems, newton_, loaded);
 }
 
 void Automatic::arclength_path(Search& search, bool at_once) {
@@ -238,7 +242,6 @@ void Automatic::arclength_path(Search& search, bool at_once) {
 // differ by more digits than a double has. Interior points then leave a few separated contacts
 // unsolved, far from each other, which are solved as parts.
 void Automatic::solve_parts_of_end(Search& search) {
-  constexpr double kShare = 0.1;  // of the work before
   constexpr int kRounds = 8;
   if (!search.near_round_off() || search.solved() || search.exhausted()) return;
   const double before = search.counts.work;
@@ -268,7 +271,6 @@ void Automatic::follow_to_the_end(Search& search) {
 // smaller impulses.
 void Automatic::proximal_path_from_small(Search& search) {
   constexpr double kGrown = 10;  // times the impulses by which all stick
-  constexpr int kProblems = 60;
   if (!(interior_.size_over_sticking(search, search.best.data()) > kGrown)) return;
   const double before = search.best_error;
   for (double small : {1e-3, 1e-6}) {
@@ -276,7 +278,7 @@ void Automatic::proximal_path_from_small(Search& search) {
     entries(x_) *= small;
     search.system.sweep(x_.data());
     search.count_sweep();
-    interior_.run_proximal(search, x_.data(), kProblems, newton_, true);
+    interior_.run_proximal(search, x_.data(), kFarProblems, newton_, true);
     if (search.solved() || search.exhausted() || search.best_error < kGain * before) return;
   }
 }

@@ -81,8 +81,7 @@ bool AcceleratedSweeps::extrapolates(int sweep, double f, int toggled) {
     mode_ = Mode::helps;
   }
   if (mode_ == Mode::waits) {
-    if (quiet_ < (carried() ? std::max(kCarriedQuiet, quiet_checked_) : quiet_checked_))
-      return false;
+    if (quiet_ < (carried() ? std::max(2 * kWindow, quiet_checked_) : quiet_checked_)) return false;
     mode_ = Mode::helps;
     anderson_.clear();
     least_f_ = begun_f_ = window_f_ = f;

@@ -25,7 +25,7 @@ class AcceleratedSweeps {
 
  private:
   static constexpr int kToggles = 4, kLeastQuiet = 3, kMostQuiet = 320, kWindow = 60, kRecent = 10,
-                       kPersuaded = 40, kFew = 500, kCarriedQuiet = 120, kDepth = 10;
+                       kPersuaded = 40, kFew = 500, kDepth = 10;
   static constexpr double kToggledShare = 0.003, kMomentumCost = 3;  // the latter ns a contact
 
   int toggles(const System& system);

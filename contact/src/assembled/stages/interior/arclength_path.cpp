@@ -224,7 +224,7 @@ struct InteriorPoint::ArclengthPath {
 
   // A shorter step from the last point; false: none is left.
   bool go_back() {
-    constexpr double kShorter = 0.25, kLeast = 1e-3;
+    constexpr double kShorter = 0.25;
     step *= kShorter;
     if (step < kLeast) return false;
     pairs.go_to(last.place);
@@ -234,7 +234,6 @@ struct InteriorPoint::ArclengthPath {
 
   // The first point: Newton's method at constant nu.
   bool begin(double nu) {
-    constexpr double kLeast = 1e-3;
     constexpr int kMost = 40;
     pairs.take(own.point_, nu);
     evaluate();
@@ -254,16 +253,16 @@ struct InteriorPoint::ArclengthPath {
 
   // Along the curve and back to it; false: it is lost.
   bool go_on() {
-    // A direction that could be followed for so long is taken, and is the last one where it could
-    // be for longer. The next one may not be much shorter.
-    constexpr double kTaken = 1, kFewer = 0.7, kMore = 1.7, kLongest = 1;
-    constexpr int kMost = 6, kMany = 3;
+    // A direction that could be followed to its end is taken, and is the last one where it could be
+    // for kLast times as long. The next one may not be much shorter.
+    constexpr double kFewer = 0.7, kMore = 1.7;
+    constexpr int kMost = 6;
     go_along(tangent);
     double before = 0;
     for (int iteration = 1; !search.exhausted(); ++iteration) {
       const double longest = directions(true) ? reach() : 0;
       const bool near = longest >= kLast;
-      if (!near && (!(longest >= std::max(kTaken, kFewer * before)) || iteration > kMost)) {
+      if (!near && (!(longest >= std::max(1.0, kFewer * before)) || iteration > kMost)) {
         if (!go_back()) return false;
         iteration = 0;
         before = 0;
@@ -274,21 +273,22 @@ struct InteriorPoint::ArclengthPath {
       pairs.move(newton, length, length * newton_log_nu);
       evaluate();
       if (!near) continue;
-      if (iteration == 1) step = std::min(kLongest, kMore * step);
-      if (iteration >= kMany) step *= kFewer;
+      if (iteration == 1) step = std::min(1.0, kMore * step);
+      if (iteration >= kMost / 2) step *= kFewer;
       last = {pairs.place(), tangent};
       return true;
     }
     return false;
   }
 
-  static constexpr double kLast = 4, kInside = 0.9;
+  // kLeast: of steps, and of parts of Newton's direction that can be followed.
+  static constexpr double kLast = 4, kInside = 0.9, kLeast = 1e-3;
 };
 
 void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newton) {
   // The shift, relative to A, keeps digits where contacts stick: there 1 / W^2 = x / u grows
   // without bound, and takes those of the bodies that slide.
-  constexpr double kShift = 1e-11, kNear = 1, kFar = 1e5, kFarther = 100;
+  constexpr double kShift = 1e-11, kFar = 1e5, kFarther = 100;
   constexpr double kTested = 1e-5, kEnd = 1e-24;  // of the first nu
   constexpr double kTry = 1e-6, kGain = 0.1;
   constexpr int kProblems = 3;  // of proximal Newton, where the curve is near a solution
@@ -298,7 +298,7 @@ void InteriorPoint::run_arclength(Search& search, int most, ProximalNewton& newt
   ArclengthPath path(*this, search);
   double first = 0;
   bool on_path = false;
-  for (double near = kNear; !on_path && near <= kFar && !search.exhausted(); near *= kFarther) {
+  for (double near = 1; !on_path && near <= kFar && !search.exhausted(); near *= kFarther) {
     if (!start_near(search, search.best.data(), near)) return;
     first = equations_.complementarity(point_);
     on_path = path.begin(first);
