@@ -201,8 +201,6 @@ void join_outlines(const std::vector<std::vector<contact::OpenFace>>& faces,
   *first = std::move(joined);
 }
 
-using Eigen::Vector3d;
-
 Mesh capsule_mesh(double radius, double length, int around) {
   const int rings = std::max(2, around / 4);  // of each half, pole excluded
   const auto n = static_cast<std::size_t>(around);

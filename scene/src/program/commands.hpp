@@ -34,8 +34,6 @@ std::string table_field(std::string_view text);
 /// behind the summary, or nothing; `wall`: seconds of the whole program, reading and output
 /// included.
 void report(const Scene& scene, const RunResult& result, const std::string& shared, double wall);
-/// Warnings of what the scene begins with that its author may not have meant.
-void print_start(const Scene& scene);
 /// Time spent on each effect.
 void print_costs(const RunResult& result);
 /// kGood, kNotMet or kFailed.

@@ -204,18 +204,6 @@ void report(const Scene& scene, const RunResult& r, const std::string& shared, d
   std::fflush(stdout);
 }
 
-void print_start(const Scene& scene) {
-  for (const std::string& each : overlaps_at_start(scene))
-    fmt::print("WARNING   {}\n", on_terminal(each));
-  const std::vector<std::string> names = bodies_out_of_touch(scene);
-  if (names.empty()) return;
-  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kMostNamed, names.size()));
-  fmt::print(
-      "note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
-      fmt::join(names.begin(), end, ", "),
-      names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
-}
-
 // Everything on the clock: parts that were measured on different clocks add up to nothing.
 void print_costs(const RunResult& r) {
   double sum = 0;

@@ -2,6 +2,7 @@
 // certificate hold? SPDX-License-Identifier: BSD-3-Clause
 #include <iostream>
 
+#include "bounds.hpp"
 #include "certificate/judge.hpp"
 #include "plan/engine_type.hpp"
 #include "program/commands.hpp"
@@ -9,6 +10,19 @@
 namespace tether::scene {
 
 namespace {
+
+/// Warnings of what the scene begins with that its author may not have meant.
+void print_start(const Scene& scene) {
+  for (const std::string& each : overlaps_at_start(scene))
+    fmt::print("WARNING   {}\n", on_terminal(each));
+  const std::vector<std::string> names = bodies_out_of_touch(scene);
+  if (names.empty()) return;
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(kMostNamed, names.size()));
+  fmt::print(
+      "note      nothing can touch {}{}: no [[pair]] lets something meet their material\n",
+      fmt::join(names.begin(), end, ", "),
+      names.size() > kMostNamed ? fmt::format(" and {} more", names.size() - kMostNamed) : "");
+}
 
 struct CheckArguments {
   std::vector<std::string> files;
