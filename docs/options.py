@@ -74,7 +74,7 @@ def problems():
     for name in sorted(linalg ^ {p.name for p in (ROOT / "linalg" / "include" / "tether" / "linalg").glob("*.hpp")}):
         yield f"linalg/README.md: {name} is " + ("no header" if name in linalg else "not told")
     page = (ROOT / "docs" / "scene_fields.md").read_text()
-    source = (ROOT / "scene" / "src" / "files" / "read.hpp").read_text()
+    source = (ROOT / "scene" / "src" / "files" / "read.cpp").read_text()
     parts = "".join(part for part in page.split("\n## ") if re.match(r"\[(?:smooth|stepping|event)\]", part))
     told = {name for row in tables(parts, "field") for name in re.findall(r"`(\w+)`", row[0])}
     read = set(re.findall(r"io\.\w+\(\s*\"(\w+)\"", source))

@@ -71,7 +71,7 @@ endfunction()
 
 # Functions that move bodies or laws: an effect that a scene does not name is not made, and its law not asked.
 set(words CentralGravityForce:: DragForce:: LoadForce:: SpringForces:: JointFrictionEffect::add_laws
-  JointLimitEffect::add_laws JointMotorEffect::add_laws LawRows::start detail::Restitution:: ConeSources::hold_moments)
+  JointLimitEffect::add_laws JointMotorEffect::add_laws LawRows::start detail::Restitution:: ::check_friction)
 
 ran(with_forces "${start}${axle}${laws}${floor}restitution = 0.5\n${forces}${steps}" all)
 ran(with_rolling "${start}${floor}rolling = 0.01\n${steps}" rolling)

@@ -237,8 +237,9 @@ struct StepperMemory {
   /// from step to step as long as the body has this angular velocity (rad/s) and orientation:
   /// rounding of computing it anew is biased and would add up.
   struct Spin {
-    Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_velocity = momentum;
-    linalg::Quaternion orientation = linalg::Quaternion::Identity();
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();               ///< kg m^2/s, world axes
+    Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< rad/s, world axes
+    linalg::Quaternion orientation = linalg::Quaternion::Identity();  ///< of the body's axes
   };
   long steps = 0;                            ///< taken since the start
   WarmStart contacts, corrections, bounces;  ///< of the contact problems of a step
