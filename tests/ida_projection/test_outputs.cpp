@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <problems/car_axis.hpp>
 #include <problems/governor.hpp>
 #include <problems/linear_masses.hpp>
 #include <problems/pendulum.hpp>
+#include <problems/rows.hpp>
 
 #include "host.hpp"
 #include "motions.hpp"
@@ -76,6 +78,20 @@ Problem fast_output(double w) {
   };
   p.reference = {1.0, 0.0, 0.0};
   p.error_components = 2;
+  return p;
+}
+
+// x, y turn at a rate that depends on y_a a little; F says what y_a is, by `equation`(t, y_a) = 0.
+Problem turns_with(double start, double rate, double share, double t_end,
+                   const std::function<double(double t, double a)>& equation) {
+  const auto speed = [=](double a) { return rate * (1.0 + share * a * a); };
+  Problem p = tether::problems::start_problem("turns", "index 1", 2, t_end, {1.0, 0.0, start},
+                                              {0.0, speed(start), 0.0}, {1.0, 1.0, 0.0});
+  p.residual = [=](double t, const double* y, const double* yp, double* r) {
+    r[0] = yp[0] + speed(y[2]) * y[1];
+    r[1] = yp[1] - speed(y[2]) * y[0];
+    r[2] = equation(t, y[2]);
+  };
   return p;
 }
 
@@ -168,6 +184,82 @@ TEST_CASE("coupled algebraic variables: 27 jumps of a force are passed") {
     CHECK(run.steps <= 3500);
     CHECK(worst(run, exact) <= 500.0 * tolerance);
   }
+}
+
+TEST_CASE(
+    "coupled algebraic variables: an oscillation that grows out of the tolerance is resolved") {
+  const auto root = [](double t) {
+    return 2.5 * (0.5 + 0.5 * std::tanh((t - 300.0) / 20.0)) * std::sin(3.0 * t);
+  };
+  const Problem problem =
+      turns_with(0.0, 0.01, 1e-3, 660.0, [=](double t, double a) { return a - root(t); });
+  for (const double tolerance : {1e-4, 1e-6}) {
+    double largest[2] = {0.0, 0.0};  // of plain IDA, and projected
+    for (const bool projected : {false, true}) {
+      Host host(problem, tolerance);
+      if (projected) host.attach(on_circle());
+      for (double t = 100.0; t < 650.0; t += 7.31) {
+        REQUIRE(host.to(t) >= 0);
+        largest[projected] = std::max(largest[projected], std::abs(host.data()[2] - root(t)));
+      }
+    }
+    INFO("tolerance " << tolerance);
+    CHECK(largest[1] <= 2.0 * largest[0]);
+  }
+}
+
+TEST_CASE("coupled algebraic variables: nearly dependent rows do not take them out of the test") {
+  for (const double width : {0.5, 0.1})
+    for (const double tolerance : {1e-4, 1e-6, 1e-8}) {
+      // A front of this width to a value at which other roots are near.
+      const auto root = [=](double t) { return 5.0 * std::tanh((t - 30.0) / width); };
+      Problem problem =
+          tether::problems::start_problem("two turn", "index 1", 4, 60.0, {1, 0, 1, 0, root(0.0)},
+                                          {0, 0.01, 0, 0.02, 0}, {1, 1, 1, 1, 0});
+      problem.residual = [=](double t, const double* y, const double* yp, double* r) {
+        const double rate = 0.01 * (1.0 + 0.3 * std::sin(y[4] / 2.0));
+        r[0] = yp[0] + rate * y[1];
+        r[1] = yp[1] - rate * y[0];
+        r[2] = yp[2] + 2.0 * rate * y[3];
+        r[3] = yp[3] - 2.0 * rate * y[2];
+        r[4] = std::sin(y[4] - root(t));
+      };
+      const tp::Constraints rows =
+          on_circle() + row(
+                            "both",
+                            [](double, const double* y) {
+                              return (y[0] * y[0] + y[1] * y[1] - 1.0) / 2.0 +
+                                     5e-5 * (y[2] * y[2] + y[3] * y[3] - 1.0);
+                            },
+                            [](double, const double* y, double* C) {
+                              C[0] = y[0];
+                              C[1] = y[1];
+                              C[2] = 1e-4 * y[2];
+                              C[3] = 1e-4 * y[3];
+                            });
+      Host host(problem, tolerance);
+      host.attach(rows);
+      INFO("width " << width << ", tolerance " << tolerance);
+      REQUIRE(host.to(60.0) >= 0);
+      CHECK(std::abs(host.data()[4] - root(60.0)) <= 0.5);
+    }
+}
+
+TEST_CASE("coupled algebraic variables: a start off their equations is healed, as IDA heals it") {
+  for (const double off : {1e-3, 1e-2})
+    for (const double tolerance : {1e-4, 1e-6}) {
+      Problem problem =
+          turns_with(1.0 + off, 0.5, 1.0, 10.0, [](double, double a) { return a * a * a - 1.0; });
+      problem.yp0[1] = 1.0;
+      Host host(problem, tolerance);
+      IDASetId(host.ida, host.vector(problem.id));
+      IDASetSuppressAlg(host.ida, 1);
+      host.attach(on_circle());
+      INFO("off by " << off << ", tolerance " << tolerance);
+      REQUIRE(host.to(10.0) >= 0);
+      CHECK(std::abs(host.data()[0] - std::cos(10.0)) <= 100.0 * tolerance);
+      CHECK(std::abs(host.data()[2] - 1.0) <= 10.0 * tolerance);
+    }
 }
 
 TEST_CASE("a long move does not hide a jump of F from the error test") {
