@@ -77,13 +77,6 @@ class GradientRows {
     }
     N_VProd(dy, D, dy);
   }
-  /// to <- to + the part of v, which is divided by D, in the space of the kept rows.
-  void add_part(N_Vector v, N_Vector to) const {
-    for (int k = 0; k < rank_; ++k) {
-      N_Vector q = gradients_[at(pivot_[at(k)])];
-      N_VLinearSum(1.0, to, N_VDotProd(q, v), q, to);
-    }
-  }
   /// After solve(): a dropped row that asks for more than half a tolerance beyond the kept rows,
   /// and those rows, ascending. Empty: there is none.
   std::vector<int> contradicting() const {
