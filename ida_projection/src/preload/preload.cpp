@@ -46,7 +46,7 @@ Function* behind(const char* name) noexcept {
 }
 
 struct Host {
-  tether::ida_projection::OwnedVector start;  // IDAInit's y, until the rows are attached
+  Owned<N_Vector, N_VDestroy> start;  // IDAInit's y, until the rows are attached
   SUNNonlinearSolver nonlinear_solver = nullptr;
   bool asked = false, refused = false, project_output = false;
   Owned<tether_projection*, tether_projection_free> projection;
@@ -71,9 +71,10 @@ struct Ours {
 
 tether_preload_fn registered = nullptr;
 
-/// The user's function; null without TETHER_CONSTRAINTS. Where it cannot be used, one that fails.
-tether_preload_fn constraints_of_the_user() {
+/// The user's function; null without TETHER_CONSTRAINTS, or where it cannot be used (said once).
+tether_preload_fn constraints_of_the_user(bool& failed) {
   if (registered) return registered;
+  static bool wrong = false;
   static const auto function = []() -> tether_preload_fn {
     const char* path = secure_getenv("TETHER_CONSTRAINTS");
     if (!path || !*path) {
@@ -82,16 +83,21 @@ tether_preload_fn constraints_of_the_user() {
     }
     void* object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     void* symbol = object ? dlsym(object, "tether_preload") : nullptr;
-    if (symbol) return reinterpret_cast<tether_preload_fn>(symbol);
-    const char* why = dlerror();
-    complain(path, why ? why : "tether_preload is null");
-    return [](void*, N_Vector, tether_constraints*, tether_options*) { return -1; };
+    if (!symbol) {
+      const char* why = dlerror();
+      complain(path, why ? why : "tether_preload is null");
+      wrong = true;
+    }
+    return reinterpret_cast<tether_preload_fn>(symbol);
   }();
+  failed = wrong;
   return function;
 }
 
 int attach(void* ida_mem, Host& host) {
-  const auto ask = constraints_of_the_user();
+  bool failed = false;
+  const auto ask = constraints_of_the_user(failed);
+  if (failed) return IDA_ILL_INPUT;
   if (!ask || !host.start) return IDA_SUCCESS;
   const Owned<tether_constraints*, tether_constraints_free> rows(tether_constraints_new());
   if (!rows) return complain("no memory", tether_last_error());
@@ -126,19 +132,23 @@ int prepare(void* ida_mem) noexcept {
   }
 }
 
-/// act(host) for an IDA that was made here; its result, or `otherwise`.
-template <class Result, class Act>
-Result with_host(void* ida_mem, Result otherwise, Act act) {
-  const std::lock_guard<std::recursive_mutex> lock(mutex);
-  const auto host = hosts().find(ida_mem);
-  return host != hosts().end() ? act(host->second) : otherwise;
+void remember_start(void* ida_mem, N_Vector yy0) noexcept {
+  try {
+    const std::lock_guard<std::recursive_mutex> lock(mutex);
+    Host& host = hosts()[ida_mem];
+    host.start.reset(N_VClone(yy0));
+    if (host.start) N_VScale(1.0, yy0, host.start.get());
+  } catch (...) {
+    complain("IDAInit", "out of memory");
+  }
 }
 
 tether_projection* projection_of_output(void* ida_mem) noexcept {
   if (ida_mem == ours) return nullptr;
-  return with_host(ida_mem, static_cast<tether_projection*>(nullptr), [](Host& host) {
-    return host.project_output ? host.projection.get() : nullptr;
-  });
+  const std::lock_guard<std::recursive_mutex> lock(mutex);
+  const auto host = hosts().find(ida_mem);
+  return host != hosts().end() && host->second.project_output ? host->second.projection.get()
+                                                              : nullptr;
 }
 
 }  // namespace
@@ -147,10 +157,11 @@ extern "C" {
 #pragma GCC visibility push(default)
 
 int tether_preload_project_output(void* ida_mem) {
-  return with_host(ida_mem, static_cast<int>(TETHER_MEM_NULL), [](Host& host) {
-    host.project_output = true;
-    return 0;
-  });
+  const std::lock_guard<std::recursive_mutex> lock(mutex);
+  const auto host = hosts().find(ida_mem);
+  if (host == hosts().end()) return TETHER_MEM_NULL;
+  host->second.project_output = true;
+  return 0;
 }
 
 void tether_preload_ask(tether_preload_fn ask) {
@@ -162,13 +173,7 @@ int IDAInit(void* ida_mem, IDAResFn res, sunrealtype t0, N_Vector yy0, N_Vector 
   const auto next = behind<decltype(IDAInit)>("IDAInit");
   if (!next) return IDA_ILL_INPUT;
   const int flag = next(ida_mem, res, t0, yy0, yp0);
-  if (flag != IDA_SUCCESS) return flag;
-  try {
-    const std::lock_guard<std::recursive_mutex> lock(mutex);
-    hosts()[ida_mem].start = tether::ida_projection::copy_of(yy0);
-  } catch (...) {
-    complain("IDAInit", "out of memory");
-  }
+  if (flag == IDA_SUCCESS) remember_start(ida_mem, yy0);
   return flag;
 }
 
@@ -176,11 +181,12 @@ int IDASetNonlinearSolver(void* ida_mem, SUNNonlinearSolver solver) {
   const auto next = behind<decltype(IDASetNonlinearSolver)>("IDASetNonlinearSolver");
   if (!next) return IDA_ILL_INPUT;
   const int flag = next(ida_mem, solver);
-  if (flag != IDA_SUCCESS || ida_mem == ours) return flag;
-  return with_host(ida_mem, flag, [=](Host& host) {
-    host.nonlinear_solver = solver;
-    return flag;
-  });
+  if (flag == IDA_SUCCESS && ida_mem != ours) {
+    const std::lock_guard<std::recursive_mutex> lock(mutex);
+    const auto host = hosts().find(ida_mem);
+    if (host != hosts().end()) host->second.nonlinear_solver = solver;
+  }
+  return flag;
 }
 
 int IDACalcIC(void* ida_mem, int icopt, sunrealtype tout1) {
@@ -217,13 +223,17 @@ int IDAGetDky(void* ida_mem, sunrealtype t, int k, N_Vector dky) {
 void IDAFree(void** ida_mem) {
   const auto next = behind<decltype(IDAFree)>("IDAFree");
   if (!next) return;
-  std::map<void*, Host>::node_type host;
+  Host host;
   if (ida_mem && *ida_mem) {
     const std::lock_guard<std::recursive_mutex> lock(mutex);
-    host = hosts().extract(*ida_mem);
+    const auto found = hosts().find(*ida_mem);
+    if (found != hosts().end()) {
+      host = std::move(found->second);
+      hosts().erase(found);
+    }
   }
-  if (host && host.mapped().projection && std::getenv("TETHER_STATISTICS")) {
-    const char* table = tether_get_statistics_table(host.mapped().projection.get());
+  if (host.projection && std::getenv("TETHER_STATISTICS")) {
+    const char* table = tether_get_statistics_table(host.projection.get());
     if (table) std::fputs(table, stderr);
   }
   next(ida_mem);
