@@ -297,14 +297,13 @@ Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candi
   const auto polish = [&](bool after_the_move) {
     return polish_.add_newton_step(candidate, candidate.cj, tolerance, after_the_move);
   };
-  polish_.keep(candidate);
   const Fix before = polishes_first() ? polish(false) : Fix::none;
   if (in_use(Mechanism::repeated_correction) && before == Fix::misled && !fresh) {
     moved.status = Status::success;
     moved.fix = before;
     return moved;
   }
-  if (before != Fix::none) polish_.keep(candidate);
+  polish_.keep(candidate);
   Move& move = moved;
   move = rows_.used->move(candidate);
   if (move.capped) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tether/linalg/vector_code.hpp>
 
 #include "host/shortest.hpp"
 
@@ -89,23 +88,16 @@ void Evaluator::flatten(const Constraints& set) {
   for (const Constraints& part : set.joined) flatten(part);
 }
 
-template <class Fill>
-int Evaluator::write_to_room(const Part& part, int n, double* g, double* C, Fill&& fill) {
-  const int count = part.set->count;
-  return g_room_.written(g, count, std::max(count, n), [&](double* to) { return fill(to, C); });
-}
-
-template <class Fill>
-int Evaluator::write_first_C(const Part& part, int n, double* g, double* C, Fill&& fill) {
+double* Evaluator::room_for_first_C(const Part& part, int n) {
   const std::ptrdiff_t entries = part.entries(n);
-  const int flag = C_room_.written(C, entries, entries + n, [&](double* into) {
-    return g != nullptr ? write_to_room(part, n, g, into, fill) : fill(g, into);
-  });
-  part.C_checked = true;
-  return flag;
+  C_room_.reserve(entries, entries + n);
+  double* const room = C_room_.open(entries);
+  std::fill_n(room, entries, 0.0);
+  return room;
 }
 
-inline int Evaluator::value_of(const Part& part, double t, const double* y, int n, double* g) {
+TETHER_INLINE int Evaluator::value_of(const Part& part, double t, const double* y, int n,
+                                      double* g) {
   return write(part, n, g, nullptr, [&](double* to, double*) {
     return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
   });
@@ -120,7 +112,7 @@ Status Evaluator::checked(int flag, const char* what, const Part& part) {
 }
 
 template <class Call>
-Status Evaluator::each(const char*& what, Call&& call) {
+TETHER_INLINE Status Evaluator::each(const char*& what, Call&& call) {
   const Part* at = nullptr;
   const int flag = guarded(
       [&] {
@@ -137,6 +129,7 @@ Status Evaluator::each(const char*& what, Call&& call) {
 Status Evaluator::value(double t, const double* y, int n, double* g) {
   if (report.fatal) return Status::callback_fatal;
   ++statistics_.value_evaluations;
+  sum_ = 0.0;
   const char* what = "value";
   const Status status =
       each(what, [&](const Part& part) { return value_of(part, t, y, n, g + part.first_row); });
@@ -180,12 +173,13 @@ TETHER_INLINE int Evaluator::rows_of(const Part& part, const At& at, double* C, 
   });
 }
 
-Status Evaluator::all_rows(const At& at, double* g, double* entries, double* full,
-                           int Part::*first) {
+TETHER_INLINE Status Evaluator::all_rows(const At& at, double* g, double* entries, double* full,
+                                         int Part::*first) {
   if (report.fatal) return Status::callback_fatal;
   ++statistics_.jacobian_evaluations;
   if (g != nullptr) ++statistics_.value_evaluations;
   if (g != nullptr && gives_both_) ++statistics_.joint_evaluations;
+  sum_ = 0.0;
   const char* what = "";
   const Status status = each(what, [&](const Part& part) {
     double* const C = part.sparse != nullptr

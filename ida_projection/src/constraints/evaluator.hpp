@@ -11,6 +11,7 @@
 #include <tether/ida_projection/constraints.hpp>
 #include <tether/ida_projection/projection.hpp>
 #include <tether/ida_projection/statistics.hpp>
+#include <tether/linalg/vector_code.hpp>
 #include <utility>
 #include <vector>
 
@@ -32,48 +33,36 @@ std::string wrong_length(const Constraints& set, long unknowns);
 
 bool all_finite(const double* a, std::size_t n);
 
-/// Marks behind the results of a callback, which show whether it writes too much. They go with this
-/// object, and what stood there comes back.
-class Marks {
- public:
-  static constexpr std::ptrdiff_t kCount = 4;
-
-  explicit Marks(double* behind) : behind_(behind) {
-    std::memcpy(kept_, behind_, sizeof kept_);
-    for (std::ptrdiff_t i = 0; i < kCount; ++i) behind_[i] = kUnwritten;
-  }
-  ~Marks() { std::memcpy(behind_, kept_, sizeof kept_); }
-  Marks(const Marks&) = delete;
-  Marks& operator=(const Marks&) = delete;
-  bool untouched() const {
-    bool same = true;
-    for (std::ptrdiff_t i = 0; i < kCount; ++i) same &= behind_[i] == kUnwritten;
-    return same;
-  }
-
- private:
-  static constexpr double kUnwritten = 3.0517578125e-300;  // unlikely in g
-  double* behind_;
-  double kept_[kCount];
-};
-
-/// Memory for the results of a callback and for what it writes too much.
+/// Memory for the results of a callback and for what it writes too much, which marks behind them
+/// show.
 class GuardedRoom {
  public:
-  /// Size of the memory for `count` values; `more`: how many too many do no harm.
-  static std::size_t size(std::ptrdiff_t count, std::ptrdiff_t more) {
-    return static_cast<std::size_t>(count + std::max(more, kLeast));
-  }
+  /// For so many values; `more`: how many too many do no harm.
   void reserve(std::ptrdiff_t count, std::ptrdiff_t more) {
-    if (room_.size() < size(count, more)) room_.resize(size(count, more));
+    const auto size = static_cast<std::size_t>(count + std::max(more, kLeast));
+    if (room_.size() < size) room_.resize(size);
   }
-  /// call(to) writes `count` values, which are copied to `values`; `to` has these at first. Returns
-  /// its flag, or that it has written more.
+  /// To be written: so many values, at most as many as were reserved.
+  double* open(std::ptrdiff_t count) {
+    std::memcpy(room_.data() + count, kUnwritten, sizeof kUnwritten);
+    return room_.data();
+  }
+  /// Copies what was written and adds it to `sum`. False: there was more.
+  bool close(double* values, std::ptrdiff_t count, double& sum) const {
+    double added = 0.0;
+    for (std::ptrdiff_t i = 0; i < count; ++i) added += values[i] = room_[i];
+    sum += added;
+    return std::memcmp(room_.data() + count, kUnwritten, sizeof kUnwritten) == 0;
+  }
+  /// call(to) writes `count` values, which are copied to `values`. Returns its flag, or that it has
+  /// written more.
   template <class Call>
   int written(double* values, std::ptrdiff_t count, std::ptrdiff_t more, Call&& call);
 
  private:
   static constexpr std::ptrdiff_t kLeast = 64;
+  static constexpr double kMark = 3.0517578125e-300;  // unlikely in g
+  static constexpr double kUnwritten[] = {kMark, kMark, kMark, kMark};
   std::vector<double> room_;
 };
 
@@ -85,11 +74,9 @@ constexpr double kContradicts = 0.5;
 template <class Call>
 int GuardedRoom::written(double* values, std::ptrdiff_t count, std::ptrdiff_t more, Call&& call) {
   reserve(count, more);
-  std::copy(values, values + count, room_.data());
-  const Marks marks(room_.data() + count);
-  const int flag = call(room_.data());
-  std::copy_n(room_.data(), count, values);
-  return marks.untouched() ? flag : kOverran;
+  const int flag = call(open(count));
+  double sum = 0.0;
+  return close(values, count, sum) ? flag : kOverran;
 }
 
 /// The reason why rows did not succeed.
@@ -143,14 +130,8 @@ class Evaluator {
   int rows() const { return rows_; }
   /// So that value() on n unknowns never allocates.
   void reserve(int n) {
+    reserved_ = n;
     for (const Part& part : parts_) g_room_.reserve(part.set->count, std::max(part.set->count, n));
-  }
-  /// Memory for g on n unknowns to which callbacks write directly: with room for what is too much.
-  std::vector<double> make_room(int n) {
-    std::vector<double> g(GuardedRoom::size(rows_, std::max(rows_, n)), 0.0);
-    roomy_ = g.data();
-    roomy_end_ = roomy_ + rows_;
-    return g;
   }
   bool uses_differences() const { return uses_differences_; }
   /// Whether some rows have a function that gives g and C together.
@@ -208,27 +189,22 @@ class Evaluator {
   void flatten(const Constraints& set);
   Status checked(int flag, const char* what, const Part& part);
   Status finite(double t, const double* g) {
-    double sum = 0.0;
-    for (int i = 0; i < rows_; ++i) sum += g[i];
-    return std::isfinite(sum) ? Status::success : not_finite(t, g);
+    return std::isfinite(sum_) ? Status::success : not_finite(t, g);
   }
   Status not_finite(double t, const double* g);
   /// A callback that writes g, C or both. There is room behind g, the first time behind C, too, for
   /// what it writes too much, which ends the run.
   template <class Fill>
-  int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
-    if (C != nullptr && !part.C_checked) return write_first_C(part, n, g, C, fill);
-    if (g == nullptr) return fill(g, C);
-    constexpr std::less<const double*> before;  // orders pointers that are unrelated, too
-    if (before(g, roomy_) || !before(g, roomy_end_)) return write_to_room(part, n, g, C, fill);
-    const Marks marks(g + part.set->count);
-    const int flag = fill(g, C);
-    return marks.untouched() ? flag : kOverran;
+  TETHER_INLINE int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
+    if (n > reserved_) reserve(n);
+    const int count = part.set->count;
+    double* const into = C == nullptr || part.C_checked ? C : room_for_first_C(part, n);
+    const int flag = fill(g != nullptr ? g_room_.open(count) : nullptr, into);
+    bool whole = g == nullptr || g_room_.close(g, count, sum_);
+    if (into != C) whole &= part.C_checked = C_room_.close(C, part.entries(n), sum_);
+    return whole ? flag : kOverran;
   }
-  template <class Fill>
-  int write_to_room(const Part& part, int n, double* g, double* C, Fill&& fill);
-  template <class Fill>
-  int write_first_C(const Part& part, int n, double* g, double* C, Fill&& fill);
+  double* room_for_first_C(const Part& part, int n);
   /// call(part) for all sets, until one fails; `what` names the callback.
   template <class Call>
   Status each(const char*& what, Call&& call);
@@ -245,10 +221,10 @@ class Evaluator {
   Statistics& statistics_;
   std::vector<Part> parts_;
   GuardedRoom g_room_, C_room_;
-  double *roomy_ = nullptr, *roomy_end_ = nullptr;  // of make_room()
   std::vector<double> y_shifted_, g_base_, g_shifted_, entries_;
   std::string thrown_;
-  int rows_ = 0, full_rows_ = 0;
+  double sum_ = 0.0;  // of what was written: finite if all of it is
+  int rows_ = 0, full_rows_ = 0, reserved_ = 0;
   bool uses_differences_ = false, gives_both_ = false, has_sparse_ = false;
 };
 

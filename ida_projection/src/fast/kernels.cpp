@@ -89,6 +89,16 @@ struct Kernels {
     else
       each(Z, [=](auto i) { return a * x[i] + b * y[i]; });
   }
+  static int linear_sums(int count, sunrealtype a, N_Vector* X, sunrealtype b, N_Vector* Y,
+                         N_Vector* Z) {
+    for (int k = 0; k < count; ++k) {
+      if (a == 1.0 && b == 1.0)
+        each(Z[k], [x = data(X[k]), y = data(Y[k])](auto i) { return x[i] + y[i]; });
+      else
+        linear_sum(a, X[k], b, Y[k], Z[k]);
+    }
+    return 0;
+  }
   static void constant(sunrealtype c, N_Vector Z) {
     each(Z, [=](auto) { return c; });
   }
@@ -185,6 +195,7 @@ struct Kernels {
     ops->nvwrmsnorm = wrms_norm;
     ops->nvwrmsnormmask = wrms_norm_mask;
     if (!ops->nvlinearcombination) ops->nvlinearcombination = linear_combination;
+    if (!ops->nvlinearsumvectorarray) ops->nvlinearsumvectorarray = linear_sums;
     if (!spreading) return;
     ops->nvlinearcombination = combination_of_others;
     ops->nvscale = scale_of_other;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <sundials/sundials_nonlinearsolver.h>
+#include <tether/linalg/vector_code.hpp>
 
 namespace tether::ida_projection {
 
@@ -31,7 +32,7 @@ auto& owned(const char* class_name, const Pointer& owner) {
 /// Runs a user callback: no exception leaves it. Returns the callback's int; `message` receives
 /// the text of an exception, which counts as fatal.
 template <class Call>
-int guarded(Call&& call, std::string& message) noexcept {
+TETHER_INLINE int guarded(Call&& call, std::string& message) noexcept {
   const auto fail = [&message](const char* text) {
     try {
       message = text;

@@ -59,9 +59,8 @@ class Operations {
       return SUNNonlinSolSetMaxIters(inner_of(s), n);
     };
     ops->getnumiters = [](Solver s, long* n) {
-      const int flag = SUNNonlinSolGetNumIters(inner_of(s), n);
-      *n += self(s).iterations_after_correction();
-      return flag;
+      *n = self(s).corrector().iterations() + self(s).iterations_after_correction();
+      return 0;
     };
     ops->getcuriter = [](Solver s, int* n) { return SUNNonlinSolGetCurIter(inner_of(s), n); };
     ops->getnumconvfails = [](Solver s, long* n) {

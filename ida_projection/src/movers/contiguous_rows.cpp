@@ -36,7 +36,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
         reported_(static_cast<std::size_t>(reported >= 0 ? reported : evaluator_.rows())),
         inverse_n_(1.0 / size),
         y_(static_cast<std::size_t>(size), 0.0),
-        g_(evaluator_.make_room(size)),
+        g_(static_cast<std::size_t>(evaluator_.rows()), 0.0),
         kept_g_(g_) {}
 
   Status load(const Candidate& candidate, bool refills) override {
@@ -74,39 +74,12 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   Solution solve(Solve how) override {
     Solution found;
     rows_.solve(g_);
-    if (how == Solve::point) {  // C of another point says nothing about its thin rows
-      thin_ = lasting_ = false;
-      double sum = 0.0;
-      rows_.for_moves([&](int j, double move) { sum += square(move * at_.weight_entries[j]); });
-      found.length = wrms(sum);
-      found.rank = rows_.rank();
-      return found;
-    }
+    if (how == Solve::point) return solution_at_point();
     if (how != Solve::test) ++statistics_.iterations;
     found.length = length_of_solution();
-    solved_ = std::max(solved_, length_of_solved());
-    if (how == Solve::first && thin_) {
-      found.length = judge_thin_rows(found.length);
-      if (!moved_ && rows_.trust.must_learn()) {
-        // The move of the firm rows shows how C turns. Then all rows are judged at the start of the
-        // move.
-        rows_.for_moves([this](int j, double move) { y_[static_cast<std::size_t>(j)] -= move; });
-        found.status = learn_trust(found.length);
-        place(at_);
-        if (found.status == Status::success) found.status = factor(t_, false);
-        if (found.status != Status::success) return found;
-        rows_.solve(g_);
-        found.length = judge_thin_rows(length_of_solution());
-      }
-    }
-    if (how != Solve::rest && !dropped_follow()) {
-      lasting_ = false;
-      if ((found.status = factor(t_, false)) != Status::success) return found;
-      rows_.solve(g_);
-      found.length = length_of_solution();
-      if (thin_) found.length = judge_thin_rows(found.length);
-      (void)dropped_follow();  // notes what they ask for now
-    }
+    if (!rows_.d.rows.empty() && !rows_.a.rows.empty())
+      solved_ = std::max(solved_, length_of_solved());
+    if (factors != Factors::of_all_rows) found = with_independent_rows(found, how);
     length_ = found.length;
     return found;
   }
@@ -338,10 +311,9 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   // The same of the algebraic variables that rows are solved for, beside others.
   double length_of_solved() const {
     double sum = 0.0;
-    if (!rows_.d.rows.empty() && !rows_.a.rows.empty())
-      rows_.a.for_columns([&sum, dy = rows_.a.dy.data(), w = at_.weight_entries](int k, int j) {
-        sum += square(dy[k] * w[j]);
-      });
+    rows_.a.for_columns([&sum, dy = rows_.a.dy.data(), w = at_.weight_entries](int k, int j) {
+      sum += square(dy[k] * w[j]);
+    });
     return wrms(sum);
   }
   double length_with(int rank) {
@@ -420,6 +392,42 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     }
     return more == 0 && more_rows == 0 && values > 0.0 &&
            std::abs(rates - values) <= kAlike * values;
+  }
+  // C of another point says nothing about its thin rows.
+  Solution solution_at_point() {
+    thin_ = lasting_ = false;
+    double sum = 0.0;
+    rows_.for_moves([&](int j, double move) { sum += square(move * at_.weight_entries[j]); });
+    Solution found;
+    found.length = wrms(sum);
+    found.rank = rows_.rank();
+    return found;
+  }
+  // The solution with the rows that can be trusted, where some are thin or were dropped.
+  [[gnu::noinline]] Solution with_independent_rows(Solution found, Solve how) {
+    if (how == Solve::first && thin_) {
+      found.length = judge_thin_rows(found.length);
+      if (!moved_ && rows_.trust.must_learn()) {
+        // The move of the firm rows shows how C turns. Then all rows are judged at the start of the
+        // move.
+        rows_.for_moves([this](int j, double move) { y_[static_cast<std::size_t>(j)] -= move; });
+        found.status = learn_trust(found.length);
+        place(at_);
+        if (found.status == Status::success) found.status = factor(t_, false);
+        if (found.status != Status::success) return found;
+        rows_.solve(g_);
+        found.length = judge_thin_rows(length_of_solution());
+      }
+    }
+    if (how != Solve::rest && !dropped_follow()) {
+      lasting_ = false;
+      if ((found.status = factor(t_, false)) != Status::success) return found;
+      rows_.solve(g_);
+      found.length = length_of_solution();
+      if (thin_) found.length = judge_thin_rows(found.length);
+      (void)dropped_follow();  // notes what they ask for now
+    }
+    return found;
   }
   // Length of the move that the rounding of g asks for in the worst case, with the current factors:
   // at most sum_i |dy_i|, dy_i the move for row i alone, and so sqrt(m sum_i |dy_i|^2), the sum of

@@ -32,17 +32,10 @@ class LocalMetric {
     const double* __restrict ycor = at.correction_entries;
     for (std::size_t i = 0; i < n; ++i)
       trial[i] = std::max(kMetricDecay * scale[i], std::abs(ycor[i]));
-    const double* const w = at.weight_entries;
     const std::vector<int>& groups = levels_.empty() ? options_.group : levels_;
     const bool local = options_.advanced.metric == Metric::local_correction;
     if (local && groups.empty() && !by_rates()) return true;
-    // A component without a weight (WT = 0) has the corrector's change as its scale.
-    for (std::size_t i = 0; i < n; ++i)
-      D_[i] = local ? D(trial[i], w[i]) : w[i] > 0.0 ? 1.0 / w[i] : trial[i];
-    if (local && !groups.empty())
-      share(w, groups);
-    else if (local)
-      limit(at.h);
+    find_together(at, local, groups);
     return false;
   }
   /// D of a component, from its s and weight.
@@ -66,6 +59,19 @@ class LocalMetric {
   }
 
  private:
+  // D of components that depend on each other, or of error weights. A component without a weight
+  // (WT = 0) has the corrector's change as its scale.
+  [[gnu::noinline]] void find_together(const Candidate& at, bool local,
+                                       const std::vector<int>& groups) {
+    const double* const w = at.weight_entries;
+    const std::vector<double>& s = trial_scale_;
+    for (std::size_t i = 0; i < s.size(); ++i)
+      D_[i] = local ? D(s[i], w[i]) : w[i] > 0.0 ? 1.0 / w[i] : s[i];
+    if (local && !groups.empty())
+      share(w, groups);
+    else if (local)
+      limit(at.h);
+  }
   // One scale for each group: rms of |correction| in tolerances over its members.
   void share(const double* w, const std::vector<int>& group) {
     const auto groups = static_cast<std::size_t>(1 + *std::max_element(group.begin(), group.end()));

@@ -224,7 +224,7 @@ class Newton : public RowsAt {
   }
 
   // Whether a long first move may be made as it is. False: it was rejected, or made up to the cap.
-  bool allowed(const Candidate& candidate, Move& result) {
+  [[gnu::noinline]] bool allowed(const Candidate& candidate, Move& result) {
     const double length = result.length;
     const double limit = options_.advanced.largest_move * std::max(1.0, self().corrected());
     if (length <= limit) return true;
@@ -278,8 +278,8 @@ class Newton : public RowsAt {
 
   // After a move: whether Newton's method has ended. A status other than success means that it
   // failed.
-  bool done(const Candidate& candidate, const Solution& found, double previous, bool fresh,
-            Move& result, Verdict* verdict) {
+  [[gnu::noinline]] bool done(const Candidate& candidate, const Solution& found, double previous,
+                              bool fresh, Move& result, Verdict* verdict) {
     const double length = found.length;
     // A first move longer than the largest floor does not need the floor.
     const double floor = result.moves == 1 && length > kLargestFloor

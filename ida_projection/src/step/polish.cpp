@@ -41,15 +41,15 @@ void Polish::keep(const Candidate& candidate) {
 }
 
 // delta = -J^-1 F(t, ypred + ycor_N, yppred + cj ycor_N).
-bool Polish::newton_step(N_Vector delta) {
-  if (corrector_.residual(corrected_, delta) != 0) return false;
+bool Polish::newton_step(N_Vector ycor, N_Vector delta) {
+  if (corrector_.residual(ycor, delta) != 0) return false;
   ++statistics_.residual_evaluations;
   N_VScale(-1.0, delta, delta);
   return corrector_.solve_linear(delta);
 }
 
 bool Polish::know_noise() {
-  if (known_ == Known::nothing && newton_step(noise_)) known_ = Known::noise;
+  if (known_ == Known::nothing && newton_step(corrected_, noise_)) known_ = Known::noise;
   return known_ != Known::nothing;
 }
 
@@ -65,7 +65,7 @@ bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
     N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
     N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
   }
-  const bool found = newton_step(delta_);
+  const bool found = newton_step(corrected_, delta_);
   N_VScale(1.0, work_, candidate.base);
   return found;
 }
@@ -90,10 +90,12 @@ const double* Polish::response(const Candidate& candidate, N_Vector residual) {
 }
 
 Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolerance, bool moved) {
-  if (in_use(Mechanism::forecast_polish) && forecast_polish(candidate, cj, tolerance))
+  const N_Vector ycor = moved ? corrected_ : candidate.correction;
+  const bool known = moved && known_ == Known::noise_and_step;
+  if (!known && in_use(Mechanism::forecast_polish) &&
+      forecast_polish(candidate, ycor, cj, tolerance))
     return Fix::confirmed;
-  const bool known = known_ == Known::noise_and_step;
-  if (!known && !(moved ? newton_step_at_moved_point(candidate) : newton_step(delta_)))
+  if (!known && !(moved ? newton_step_at_moved_point(candidate) : newton_step(ycor, delta_)))
     return Fix::none;
   forget_step();
   ++iterations_;
@@ -105,7 +107,7 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
     N_VConst(0.0, delta_);
     return Fix::misled;
   }
-  if (!known) learn_pattern(candidate, cj);
+  if (!known) learn_pattern(candidate, ycor, cj);
   const bool differential = length <= 10.0 * tolerance;
   apply(candidate, differential ? 1.0 : 0.0, algebraic);
   if (differential) ++statistics_.extra_iterations;
@@ -113,18 +115,17 @@ Fix Polish::add_newton_step(const Candidate& candidate, double cj, double tolera
   return length <= kMisledFactor * tolerance ? Fix::confirmed : Fix::misled;
 }
 
-void Polish::learn_pattern(const Candidate& candidate, double cj) {
+void Polish::learn_pattern(const Candidate& candidate, N_Vector ycor, double cj) {
   if (!forecast_) return;
   if (variables_.any() || corrector_.iterations() != 1) return forecast_->forget();
-  forecast_->learn(candidate.weights, corrected_, delta_, cj);
+  forecast_->learn(candidate.weights, ycor, delta_, cj);
 }
 
 // ycor <- ycor + delta, if delta can be forecast.
-bool Polish::forecast_polish(const Candidate& candidate, double cj, double tolerance) {
-  if (!forecast_ || known_ == Known::noise_and_step || corrector_.iterations() != 1 ||
-      !forecast_->can_forecast(cj))
-    return false;
-  forecast_->tell(cj, corrected_, delta_);
+bool Polish::forecast_polish(const Candidate& candidate, N_Vector ycor, double cj,
+                             double tolerance) {
+  if (!forecast_ || corrector_.iterations() != 1 || !forecast_->can_forecast(cj)) return false;
+  forecast_->tell(cj, ycor, delta_);
   if (!(N_VWrmsNorm(delta_, candidate.weights) <= kMisledFactor * tolerance)) return false;
   forecast_->used();
   N_VLinearSum(1.0, candidate.correction, 1.0, delta_, candidate.correction);

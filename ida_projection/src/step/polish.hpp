@@ -169,10 +169,10 @@ class Polish {
   void forget_step() {
     if (known_ == Known::noise_and_step) known_ = Known::noise;
   }
-  bool newton_step(N_Vector delta);
+  bool newton_step(N_Vector ycor, N_Vector delta);
   bool newton_step_at_moved_point(const Candidate& candidate);
-  bool forecast_polish(const Candidate& candidate, double cj, double tolerance);
-  void learn_pattern(const Candidate& candidate, double cj);
+  bool forecast_polish(const Candidate& candidate, N_Vector ycor, double cj, double tolerance);
+  void learn_pattern(const Candidate& candidate, N_Vector ycor, double cj);
   /// WRMS over the differential variables.
   double differential_length(const Candidate& candidate, N_Vector v) const {
     return variables_.any() ? N_VWrmsNormMask(v, candidate.weights, variables_.id())
