@@ -164,6 +164,7 @@ class Projection::Impl {
   };
   struct Run {
     Phase phase = Phase::late;
+    bool other_metric = false;      // there is one that may be used
     bool suppressed = false;        // IDASetId and IDASetSuppressAlg are this plugin's
     std::optional<bool> iterative;  // IDA's linear solver, once it is known
     long setups = -1;               // IDA's count at the last attempt

@@ -129,17 +129,20 @@ int Projection::Impl::step(const Attempt& attempt, double tolerance, bool call_s
     if (flag != 0 || !moves) return flag;
   }
   observer_.begin_move();
-  const bool fresh = call_setup || !corrector_.has_setup();  // IDA's factors cannot be better
-  Moved move = move_and_polish(candidate, tolerance, fresh);
-  if (move.status == Status::success && move.fix == Fix::misled && !fresh &&
-      in_use(Mechanism::repeated_correction)) {
+  bool fresh = call_setup || !corrector_.has_setup();  // IDA's factors cannot be better
+  Moved move;
+  for (;;) {
+    move = move_and_polish(candidate, tolerance, fresh);
+    if (move.status != Status::success || move.fix != Fix::misled || fresh ||
+        !in_use(Mechanism::repeated_correction))
+      break;
     // A stale Jacobian has fooled IDA's convergence test: correct again with a fresh one.
     ++statistics_.corrections_repeated;
     N_VConst(0.0, candidate.correction);
     flag = corrector_.correct(candidate, tolerance, true);
     if (flag != 0) return corrector_failed(candidate, flag);
     polish_.note_setup(attempt.cj);
-    move = move_and_polish(candidate, tolerance, true);
+    fresh = true;
   }
   observer_.after_move(attempt, candidate, move, polish_.corrected(), *rows_.used);
   if (move.status != Status::success)
@@ -273,6 +276,9 @@ Status Projection::Impl::engage(const Candidate& candidate) {
       rows_.used->set_algebraic(candidate, rows_.joined.moved_id(), rows_.joined.repeats());
   if (structured != Status::success) return structured;  // the next attempt tries again
   run_.phase = Phase::engaged;
+  run_.other_metric = wanted_metric_ == Metric::automatic && in_use(Mechanism::other_metric) &&
+                      options_.group.empty() && rows_.used == rows_.own.get() &&
+                      rows_.used->may_use_levels() && unknowns_.contiguous;
   if (!options_.suppress_algebraic) return structured;
   if (in_use(Mechanism::followers) && !variables_.high_index())
     corrector_.expect_followers(variables_.id());
@@ -291,8 +297,9 @@ void Projection::Impl::leave_out_of_error_test(bool coupled) {
 }
 
 // `fresh`: IDA's factors cannot be renewed, so that no correction is repeated.
-Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candidate,
-                                                          double tolerance, bool fresh) {
+TETHER_INLINE Projection::Impl::Moved Projection::Impl::move_and_polish(const Candidate& candidate,
+                                                                        double tolerance,
+                                                                        bool fresh) {
   Moved moved;
   const auto polish = [&](bool after_the_move) {
     return polish_.add_newton_step(candidate, candidate.cj, tolerance, after_the_move);
@@ -337,12 +344,11 @@ bool Projection::Impl::polishes_first() const {
          polish_.wanted(0.0, control_.smoothing());
 }
 
-// Whether the metric may be changed and the response of F is available.
+// Whether the metric may be changed and the response of F is available. At singular positions,
+// where rows are nearly dependent, F responds to any move, stiff or not.
 bool Projection::Impl::may_change_metric() const {
-  return wanted_metric_ == Metric::automatic && rows_.used->may_use_levels() &&
-         in_use(Mechanism::other_metric) && options_.group.empty() &&
-         options_.advanced.metric == Metric::local_correction && rows_.used == rows_.own.get() &&
-         unknowns_.contiguous && polish_.is_response_available();
+  return run_.other_metric && rows_.used->factors == RowsAt::Factors::of_all_rows &&
+         options_.advanced.metric == Metric::local_correction && polish_.is_response_available();
 }
 
 // Capped moves approach the constraints step by step from a start off them. A step that ends

@@ -98,7 +98,7 @@ double* Evaluator::room_for_first_C(const Part& part, int n) {
 
 TETHER_INLINE int Evaluator::value_of(const Part& part, double t, const double* y, int n,
                                       double* g) {
-  return write(part, n, g, nullptr, [&](double* to, double*) {
+  return write_g(part, n, g, [&](double* to) {
     return part.set->value(t, ConstVector(y, n), Vector(to, part.set->count));
   });
 }
@@ -115,7 +115,7 @@ template <class Call>
 TETHER_INLINE Status Evaluator::each(const char*& what, Call&& call) {
   const Part* at = nullptr;
   const int flag = guarded(
-      [&] {
+      [&]() __attribute__((always_inline)) {
         for (const Part& part : parts_) {
           at = &part;
           if (const int failed = call(part); failed != 0) return failed;
@@ -148,28 +148,30 @@ Status Evaluator::not_finite(double t, const double* g) {
 // reads them anyway.
 TETHER_INLINE int Evaluator::rows_of(const Part& part, const At& at, double* C, double* g,
                                      const char** what) {
-  const bool both = g != nullptr && part.gives_both;
-  if (g != nullptr && !both) {
-    *what = "value";
-    const int flag = value_of(part, at.t, at.y, at.n, g);
-    if (flag != 0) return flag;
+  const ConstVector y(at.y, at.n);
+  if (g != nullptr && part.gives_both) {
+    *what = "value with jacobian";
+    return write_g(part, at.n, g, [&](double* to) {
+      return write_C(part, at.n, C, [&](double* into) {
+        const Vector value(to, part.set->count);
+        return part.sparse != nullptr
+                   ? part.sparse->fill_with_value(at.t, y, value, Vector(into, part.entries(at.n)))
+                   : part.dense->fill_with_value(at.t, y, value,
+                                                 Matrix(into, part.set->count, at.n));
+      });
+    });
   }
+  *what = "value";
+  const int flag = g != nullptr ? value_of(part, at.t, at.y, at.n, g) : 0;
+  if (flag != 0) return flag;
   if (part.dense == nullptr && part.sparse == nullptr) {
     *what = "value (differences)";
-    return differences(part, at, C);
+    return differences(part, At(at), C);
   }
-  *what = both ? "value with jacobian" : "jacobian";
-  const int count = part.set->count;
-  const ConstVector point(at.y, at.n);
-  return write(part, at.n, both ? g : nullptr, C, [&](double* to, double* entries) {
-    if (part.sparse != nullptr) {
-      const Vector into(entries, part.entries(at.n));
-      return both ? part.sparse->fill_with_value(at.t, point, Vector(to, count), into)
-                  : part.sparse->fill(at.t, point, into);
-    }
-    const Matrix into(entries, count, at.n);
-    return both ? part.dense->fill_with_value(at.t, point, Vector(to, count), into)
-                : part.dense->fill(at.t, point, into);
+  *what = "jacobian";
+  return write_C(part, at.n, C, [&](double* into) {
+    return part.sparse != nullptr ? part.sparse->fill(at.t, y, Vector(into, part.entries(at.n)))
+                                  : part.dense->fill(at.t, y, Matrix(into, part.set->count, at.n));
   });
 }
 
@@ -181,12 +183,13 @@ TETHER_INLINE Status Evaluator::all_rows(const At& at, double* g, double* entrie
   if (g != nullptr && gives_both_) ++statistics_.joint_evaluations;
   sum_ = 0.0;
   const char* what = "";
-  const Status status = each(what, [&](const Part& part) {
-    double* const C = part.sparse != nullptr
-                          ? entries + part.first_entry
-                          : full + static_cast<std::ptrdiff_t>(part.*first) * at.n;
-    return rows_of(part, at, C, g != nullptr ? g + part.first_row : nullptr, &what);
-  });
+  const Status status = each(
+      what, [&](const Part& part) __attribute__((always_inline)) {
+        double* const C = part.sparse != nullptr
+                              ? entries + part.first_entry
+                              : full + static_cast<std::ptrdiff_t>(part.*first) * at.n;
+        return rows_of(part, at, C, g != nullptr ? g + part.first_row : nullptr, &what);
+      });
   return status != Status::success || g == nullptr ? status : finite(at.t, g);
 }
 

@@ -192,17 +192,21 @@ class Evaluator {
     return std::isfinite(sum_) ? Status::success : not_finite(t, g);
   }
   Status not_finite(double t, const double* g);
-  /// A callback that writes g, C or both. There is room behind g, the first time behind C, too, for
-  /// what it writes too much, which ends the run.
+  /// A callback that writes g, or C. There is room behind g, the first time behind C, too, for what
+  /// it writes too much, which ends the run.
   template <class Fill>
-  TETHER_INLINE int write(const Part& part, int n, double* g, double* C, Fill&& fill) {
+  TETHER_INLINE int write_g(const Part& part, int n, double* g, Fill&& fill) {
     if (n > reserved_) reserve(n);
     const int count = part.set->count;
-    double* const into = C == nullptr || part.C_checked ? C : room_for_first_C(part, n);
-    const int flag = fill(g != nullptr ? g_room_.open(count) : nullptr, into);
-    bool whole = g == nullptr || g_room_.close(g, count, sum_);
-    if (into != C) whole &= part.C_checked = C_room_.close(C, part.entries(n), sum_);
-    return whole ? flag : kOverran;
+    const int flag = fill(g_room_.open(count));
+    return g_room_.close(g, count, sum_) ? flag : kOverran;
+  }
+  template <class Fill>
+  TETHER_INLINE int write_C(const Part& part, int n, double* C, Fill&& fill) {
+    double* const into = part.C_checked ? C : room_for_first_C(part, n);
+    const int flag = fill(into);
+    if (into != C) part.C_checked = C_room_.close(C, part.entries(n), sum_);
+    return part.C_checked ? flag : kOverran;
   }
   double* room_for_first_C(const Part& part, int n);
   /// call(part) for all sets, until one fails; `what` names the callback.

@@ -43,15 +43,12 @@ class Ida {
   }
   IntegratorData integrator() const {
     IntegratorData data;
-    long evaluations, setups;
-    int last_order;
-    sunrealtype first_h, last_h, h = 0.0, t = 0.0, cj = 0.0;
-    IDAGetIntegratorStats(mem_, &data.steps, &evaluations, &setups, &data.error_test_failures,
-                          &last_order, &data.order, &first_h, &last_h, &h, &t);
-    IDAGetCurrentCj(mem_, &cj);
-    data.t = t;
-    data.cj = cj;
-    data.h = h;
+    IDAGetCurrentTime(mem_, &data.t);
+    IDAGetCurrentCj(mem_, &data.cj);
+    IDAGetNumSteps(mem_, &data.steps);
+    IDAGetNumErrTestFails(mem_, &data.error_test_failures);
+    IDAGetCurrentStep(mem_, &data.h);
+    IDAGetCurrentOrder(mem_, &data.order);
     return data;
   }
   StepData step() const {

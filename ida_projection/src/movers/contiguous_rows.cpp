@@ -39,14 +39,14 @@ class ContiguousRows final : public Newton<ContiguousRows> {
         g_(static_cast<std::size_t>(evaluator_.rows()), 0.0),
         kept_g_(g_) {}
 
-  Status load(const Candidate& candidate, bool refills) override {
+  TETHER_INLINE Status load(const Candidate& candidate, bool refills) override {
     place(candidate);
     if (!refills) metric_.find(at_);
     decided_ = moved_ = false;
     solved_ = 0.0;
     return rows_.structured() ? Status::success : structure(candidate.t, nullptr);
   }
-  Status value(double t, bool with_rows) override {
+  TETHER_INLINE Status value(double t, bool with_rows) override {
     const bool both = with_rows && evaluator_.gives_both();
     const Status status =
         both ? rows(t, g_.data()) : evaluator_.value(t, y_.data(), unknowns(), g_.data());
@@ -56,7 +56,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     drift = largest;
     return status;
   }
-  Status factor(double t, bool refill) override {
+  TETHER_INLINE Status factor(double t, bool refill) override {
     if (refill) fill_metric();
     if (!rows_known_) {
       const Status status = rows(t, nullptr);
@@ -71,7 +71,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     ++statistics_.refactorizations;
     return Status::success;
   }
-  Solution solve(Solve how) override {
+  TETHER_INLINE Solution solve(Solve how) override {
     Solution found;
     rows_.solve(g_);
     if (how == Solve::point) return solution_at_point();
@@ -79,9 +79,8 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     found.length = length_of_solution();
     if (!rows_.d.rows.empty() && !rows_.a.rows.empty())
       solved_ = std::max(solved_, length_of_solved());
-    if (factors != Factors::of_all_rows) found = with_independent_rows(found, how);
     length_ = found.length;
-    return found;
+    return factors == Factors::of_all_rows ? found : with_independent_rows(found, how);
   }
   Status apply(double share, const Candidate& candidate) override {
     double* const correction = candidate.correction_entries;
@@ -156,9 +155,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     factors = Factors::none;
     return true;
   }
-  // Few rows make no rough moves. At singular positions, where rows are nearly dependent, F
-  // responds to any move, stiff or not.
-  bool may_use_levels() const override { return count() > kFew && factors == Factors::of_all_rows; }
+  bool may_use_levels() const override { return count() > kFew; }
   bool tangency(const std::vector<double>& yp, const double* id, Tangency& out) override {
     if (!rows_.structured() || factors == Factors::none) return false;
     for (std::vector<double>* each : {&out.rate, &out.terms, &out.tolerance, &out.size})
@@ -243,7 +240,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   int unknowns() const { return static_cast<int>(y_.size()); }
   bool drops_rows() const { return factors != Factors::of_all_rows && rows_.drops_rows(); }
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
-  void fill_metric() {
+  TETHER_INLINE void fill_metric() {
     if (metric_.find(at_))
       rows_.set_metric(
           [s = metric_.s(), w = at_.weight_entries](int j) { return LocalMetric::D(s[j], w[j]); });
@@ -274,7 +271,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   }
   // C at the present y, and g if wanted. Only differences and mixed rows need the size of a
   // tolerance.
-  Status rows(double t, double* g) {
+  TETHER_INLINE Status rows(double t, double* g) {
     return rows_.evaluate(t, y_.data(), rows_.needs_WT() ? WT().data() : nullptr, g, [this] {
       factors = Factors::none;
       levels_.reset();
@@ -299,7 +296,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
     return Status::success;
   }
-  double length_of_solution() {
+  TETHER_INLINE double length_of_solution() {
     double sum = 0.0;
     const Block& block = rows_.counted();
     block.for_columns([&sum, dy = block.dy.data(), w = at_.weight_entries](int k, int i) {
@@ -427,6 +424,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
       if (thin_) found.length = judge_thin_rows(found.length);
       (void)dropped_follow();  // notes what they ask for now
     }
+    length_ = found.length;
     return found;
   }
   // Length of the move that the rounding of g asks for in the worst case, with the current factors:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tether/ida_projection/options.hpp>
+#include <tether/linalg/vector_code.hpp>
 #include <utility>
 #include <vector>
 
@@ -25,7 +26,7 @@ class LocalMetric {
 
   /// Updates s with the present candidate, which accept() keeps. True: each D_i follows from its s
   /// alone, D(s, w); else D() has them all.
-  bool find(const Candidate& at) {
+  TETHER_INLINE bool find(const Candidate& at) {
     const std::size_t n = scale_.size();
     double* __restrict trial = trial_scale_.data();
     const double* __restrict scale = scale_.data();

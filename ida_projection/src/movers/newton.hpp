@@ -176,7 +176,7 @@ class Newton : public RowsAt {
   static double rounding_of(const Candidate& candidate) {
     return kEpsilon * N_VWrmsNorm(candidate.base, candidate.weights);
   }
-  Status renew_factors(double t, bool refill) {
+  TETHER_INLINE Status renew_factors(double t, bool refill) {
     const Status status = self().factor(t, refill);
     if (status == Status::success) age = 0;
     return status;

@@ -130,6 +130,7 @@ class RowsAt {
   /// From the next move on: one scale for all unknowns of a level (row_levels.hpp), or a scale for
   /// each unknown. Returns false if there are too few rows or levels.
   virtual bool use_levels(bool) { return false; }
+  /// Whether moves in the local metric can be rough.
   virtual bool may_use_levels() const { return false; }
   /// C y' row by row with C as it was evaluated last. False: not known.
   virtual bool tangency(const std::vector<double>& /*yp*/, const double* /*id*/, Tangency&) {

@@ -57,8 +57,8 @@ class StoredRows {
   RowPattern pattern(const std::vector<int>& of_rows) const;
 
   /// C at y; differences visit `columns`. g: null, or receives the values, too.
-  Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
-                  const std::vector<int>& columns, double* g) {
+  TETHER_INLINE Status evaluate(Evaluator& evaluator, double t, const double* y, const double* WT,
+                                const std::vector<int>& columns, double* g) {
     return sparse_ ? evaluator.entries(t, y, n_, WT, columns, values_.data(),
                                        values_.data() + columns_.size(), g)
                    : evaluator.jacobian(t, y, n_, WT, columns, values_.data(), g);
@@ -120,7 +120,7 @@ struct Block {
   /// From C and the metric in D(). False: an entry is not finite.
   bool factor(const StoredRows& C, int n, double rank_tolerance);
   /// The same with the rows that the last factor() has kept, by dense factors. False: it is due.
-  bool factor_kept(const StoredRows& C, int n) {
+  TETHER_INLINE bool factor_kept(const StoredRows& C, int n) {
     return rows.empty() || dense.factor_kept(C.values().data(), n, rows.data(), columns.data());
   }
   void solve();
@@ -161,7 +161,8 @@ class SplitRows {
   /// C at y; g: null, or receives the values, too. If an entry that structure() took for zero
   /// belongs to another block or to none, the rows are arranged anew: `rearranged()` then fills D.
   template <class Rearranged>
-  Status evaluate(double t, const double* y, const double* WT, double* g, Rearranged rearranged) {
+  TETHER_INLINE Status evaluate(double t, const double* y, const double* WT, double* g,
+                                Rearranged rearranged) {
     const Status status = C_.evaluate(evaluator_, t, y, WT, columns_, g);
     if (status != Status::success || !structured_ || (mixed_.empty() && watched_.empty()))
       return status;
@@ -185,9 +186,11 @@ class SplitRows {
   /// From C and the metric. False: an entry is not finite.
   bool factor();
   /// The same with the rows that the last factor() has kept. False: it is due.
-  bool factor_kept() { return !C_.sparse() && d.factor_kept(C_, n_) && a.factor_kept(C_, n_); }
+  TETHER_INLINE bool factor_kept() {
+    return !C_.sparse() && d.factor_kept(C_, n_) && a.factor_kept(C_, n_);
+  }
   /// d.dy and a.dy for the values g, with the C that was factored.
-  void solve(const std::vector<double>& g) {
+  TETHER_INLINE void solve(const std::vector<double>& g) {
     if (a.rows.empty() && !d.sparse)
       d.dense.solve(g.data(), d.dy.data());  // d has every row, in order
     else

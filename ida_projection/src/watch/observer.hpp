@@ -232,15 +232,15 @@ class Observer {
     report_.warn(Status::collapsed, cause(attempt, candidate));
     return !false_row;
   }
-  void measure(const Candidate& candidate, const Move& move, RowsAt& rows) {
+  [[gnu::noinline]] void measure(const Candidate& candidate, const Move& move, RowsAt& rows) {
     const double left = rows.remaining_drift(candidate);
     if (move.status == Status::success)
       statistics_.largest_drift_after = std::max(statistics_.largest_drift_after, left);
     statistics_.seconds += std::chrono::duration<double>(Clock::now() - move_begun_).count() *
                            static_cast<double>(tally_.attempts == 1 ? 1 : kOneIn);
   }
-  void check_rows(const Attempt& attempt, const Candidate& candidate, N_Vector corrected,
-                  RowsAt& rows) {
+  [[gnu::noinline]] void check_rows(const Attempt& attempt, const Candidate& candidate,
+                                    N_Vector corrected, RowsAt& rows) {
     if (report_.warning() != Status::success || !in_use(Mechanism::false_row_watch)) return;
     const std::string doubt =
         faults_.check(candidate, attempt, corrected, variables_, rows, corrector_);
