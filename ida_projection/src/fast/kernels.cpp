@@ -9,16 +9,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <tether/linalg/vector_code.hpp>
 #include <utility>
-
-// Arrays are the same or apart, as everywhere in SUNDIALS: no element depends on another one.
-#if defined(__clang__)
-#define TETHER_ELEMENTWISE _Pragma("clang loop vectorize(assume_safety)")
-#elif defined(__GNUC__)
-#define TETHER_ELEMENTWISE _Pragma("GCC ivdep")
-#else
-#define TETHER_ELEMENTWISE
-#endif
 
 namespace tether::ida_projection::fast {
 
@@ -91,12 +83,11 @@ struct Kernels {
   }
   static int linear_sums(int count, sunrealtype a, N_Vector* X, sunrealtype b, N_Vector* Y,
                          N_Vector* Z) {
-    for (int k = 0; k < count; ++k) {
-      if (a == 1.0 && b == 1.0)
+    if (a == 1.0 && b == 1.0)
+      for (int k = 0; k < count; ++k)
         each(Z[k], [x = data(X[k]), y = data(Y[k])](auto i) { return x[i] + y[i]; });
-      else
-        linear_sum(a, X[k], b, Y[k], Z[k]);
-    }
+    else
+      for (int k = 0; k < count; ++k) linear_sum(a, X[k], b, Y[k], Z[k]);
     return 0;
   }
   static void constant(sunrealtype c, N_Vector Z) {

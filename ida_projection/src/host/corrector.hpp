@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <tether/linalg/vector_code.hpp>
 #include <type_traits>
 #include <vector>
 
@@ -58,6 +59,24 @@ class Corrector {
   /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
   /// evaluated. Once it asked for the end of the run it is not called again.
   int residual(N_Vector ycor, N_Vector into);
+  /// The same with base(j) in place of each entry ypred_j, which is put back bit for bit: F
+  /// elsewhere than at the candidate, of contiguous vectors.
+  template <class Base>
+  int residual_with(const Candidate& candidate, Base base, N_Vector ycor, N_Vector into) {
+    const auto n = static_cast<std::size_t>(N_VGetLength(candidate.base));
+    if (kept_.size() < n) kept_.resize(n);
+    double* const predicted = candidate.base_entries;
+    double* const kept = kept_.data();
+    TETHER_ELEMENTWISE
+    for (std::size_t j = 0; j < n; ++j) {
+      kept[j] = predicted[j];
+      predicted[j] = base(j);
+    }
+    const int flag = residual(ycor, into);
+    TETHER_ELEMENTWISE
+    for (std::size_t j = 0; j < n; ++j) predicted[j] = kept[j];
+    return flag;
+  }
   bool solve_linear(N_Vector rhs);
   long iterations() const { return iterations_; }  ///< of the last correction
   int failures_in_row() const { return failures_in_row_; }
@@ -82,6 +101,7 @@ class Corrector {
   void* mem_ = nullptr;
   int stop_flag_ = 0;  // < 0: a callback ended the run in an evaluation of the plugin's own
   std::string stop_text_;
+  std::vector<double> kept_;  // entries of ypred
   static int test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                               sunrealtype tolerance, N_Vector weights, void* self);
   int install_convergence_test();

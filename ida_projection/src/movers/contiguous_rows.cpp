@@ -115,7 +115,8 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     }
     const double *e = N_VGetArrayPointer(change), *w = at_.weight_entries;
     double* y = y_.data();
-    for (int i = 0, n = unknowns(); i < n; ++i) y[i] += e[i];
+    TETHER_ELEMENTWISE
+    for (int i = 0; i < unknowns(); ++i) y[i] += e[i];
     double sum = 0.0;
     rows_.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
     return wrms(sum);

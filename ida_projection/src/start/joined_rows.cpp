@@ -11,16 +11,13 @@ namespace tether::ida_projection {
 // F(t, y, y'_pred), N values, through IDA's own callback: ypred is replaced for the call.
 bool JoinedRows::residual_at(const double* y, double* f) {
   if (!none_) {
-    for (OwnedVector* each : {&none_, &f_, &kept_}) *each = OwnedVector(present_.base);
+    for (OwnedVector* each : {&none_, &f_}) *each = OwnedVector(present_.base);
     N_VConst(0.0, none_);
   }
-  const auto size = static_cast<std::size_t>(N_VGetLength(present_.base));
-  N_VScale(1.0, present_.base, kept_);
-  std::copy_n(y, size, present_.base_entries);
   ++statistics_.residual_evaluations;
-  const bool evaluated = corrector_.residual(none_, f_) == 0;
-  N_VScale(1.0, kept_, present_.base);
-  std::copy_n(N_VGetArrayPointer(f_), size, f);
+  const bool evaluated = corrector_.residual_with(
+                             present_, [y](std::size_t j) { return y[j]; }, none_, f_) == 0;
+  std::copy_n(N_VGetArrayPointer(f_), N_VGetLength(f_), f);
   return evaluated;
 }
 

@@ -52,7 +52,7 @@ class JoinedRows {
   Constraints joined_;    // the caller's rows and equations of F
   OwnedVector moved_id_;  // id, with 1 where an algebraic variable moves with the rest
   std::vector<char> repeats_;
-  OwnedVector none_, f_, kept_;  // of residual_at(): ycor = 0, F, the prediction
+  OwnedVector none_, f_;  // of residual_at(): ycor = 0, F
   std::unique_ptr<RowsAt> rows_;
 };
 

@@ -29,7 +29,7 @@ class NearbyResiduals {
         statistics_(statistics),
         change_(std::move(change)),
         low_(change_.size()),
-        saved_(candidate.base),
+        point_(low_),
         ycor_(candidate.base),
         f_(candidate.base) {
     const double* y = N_VGetArrayPointer(around != nullptr ? around : candidate.base);
@@ -75,30 +75,29 @@ class NearbyResiduals {
     return {N_VGetArrayPointer(f_), static_cast<Eigen::Index>(change_.size())};
   }
   bool evaluate(const std::vector<int>& components, Of what) {
-    double* const base = candidate_.base_entries;
-    N_VScale(1.0, candidate_.base, saved_);
-    for (std::size_t j = 0; j < low_.size(); ++j) base[j] = low_[j] + change_[j];
+    for (std::size_t j = 0; j < low_.size(); ++j) point_[j] = low_[j] + change_[j];
     for (const int i : components) {
       const auto j = static_cast<std::size_t>(i);
       if (what == Of::values) {
-        base[j] += change_[j];
+        point_[j] += change_[j];
       } else {
         N_VGetArrayPointer(ycor_)[j] = change_[j];
-        base[j] = low_[j];
+        point_[j] = low_[j];
       }
     }
     ++statistics_.residual_evaluations;
-    const bool evaluated = corrector_.residual(ycor_, f_) == 0;
+    const bool evaluated =
+        corrector_.residual_with(
+            candidate_, [this](std::size_t j) { return point_[j]; }, ycor_, f_) == 0;
     for (const int j : components) N_VGetArrayPointer(ycor_)[j] = 0.0;
-    N_VScale(1.0, saved_, candidate_.base);
     return evaluated;
   }
 
   const Candidate& candidate_;
   Corrector& corrector_;
   Statistics& statistics_;
-  std::vector<double> change_, low_;
-  OwnedVector saved_, ycor_, f_;
+  std::vector<double> change_, low_, point_;
+  OwnedVector ycor_, f_;
   std::optional<Eigen::VectorXd> before_;  // F at the point; empty: it cannot be evaluated
 };
 

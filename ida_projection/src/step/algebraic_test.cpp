@@ -21,6 +21,7 @@
 #include <cmath>
 
 #include "host/rounding.hpp"
+#include "step/polish.hpp"
 
 namespace tether::ida_projection {
 
@@ -72,15 +73,14 @@ void AlgebraicTest::detect_jump(const Attempt& attempt) {
 }
 
 // Rounding makes independent errors, too.
-double AlgebraicTest::widened(const Variable& v, double weight, double y) const {
+double AlgebraicTest::widened(const Variable& v, double y) const {
   const double error = v.response * move_ + kEpsilon * std::abs(y);
-  return weight / (1.0 + weight * noise_ * error);
+  return v.weight / (1.0 + v.weight * noise_ * error);
 }
 
-bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candidate, double move,
-                                  const std::vector<int>& solved) {
+void AlgebraicTest::widen(const Attempt& attempt, const Candidate& candidate, double move,
+                          const std::vector<int>& solved, Polish& polish, const Ida& ida) {
   detect_jump(attempt);
-  const bool first = last_.h == 0.0;
   move_ = move;
   if (order_ != attempt.order) {
     order_ = attempt.order;
@@ -91,34 +91,32 @@ bool AlgebraicTest::begin_attempt(const Attempt& attempt, const Candidate& candi
   for (Variable& v : variables_) {
     if (attempt.accepted) v.response *= kMemory;
     if (contains(solved, v.index)) v.response = 0.0;
-    const double weight =
-        widened(v, candidate.weight_entries[v.index], candidate.base_entries[v.index]);
-    const double error = candidate.correction_entries[v.index] * weight;
+    v.weight = candidate.weight_entries[v.index];
+    const double error =
+        candidate.correction_entries[v.index] * widened(v, candidate.base_entries[v.index]);
     sum += error * error;
   }
   const double error =
       std::sqrt(sum / static_cast<double>(N_VGetLength(candidate.weights))) / (attempt.order + 1);
-  last_ = {std::abs(attempt.h), error};
-  if (first) first_ = last_;
-  return error > doubled_;
-}
-
-bool AlgebraicTest::stay() const {
-  return last_.h < first_.h && last_.error > kStays * first_.error;
-}
-
-void AlgebraicTest::widen(const Candidate& candidate, const double* response,
-                          const std::vector<int>& solved) {
-  double* weights = N_VGetArrayPointer(candidate.weights);
+  const Tested now{std::abs(attempt.h), error};
+  if (last_.h == 0.0) first_ = now;
+  last_ = now;
+  const double* const response = error > doubled_ && polish.iterations() > 0
+                                     ? polish.response(candidate, ida.step().residual)
+                                     : nullptr;
+  double* const weights = N_VGetArrayPointer(candidate.weights);
   for (Variable& v : variables_) {
     const double y = candidate.base_entries[v.index];
     // A response within rounding says nothing of S.
     if (response != nullptr && !contains(solved, v.index) &&
         std::abs(response[v.index]) > kRounding * std::abs(y))
       v.response = std::max(v.response, std::abs(response[v.index]) / move_);
-    v.weight = weights[v.index];
-    weights[v.index] = jump_ ? 0.0 : widened(v, v.weight, y);
+    weights[v.index] = jump_ ? 0.0 : widened(v, y);
   }
+}
+
+bool AlgebraicTest::stay() const {
+  return last_.h < first_.h && last_.error > kStays * first_.error;
 }
 
 void AlgebraicTest::restore(N_Vector weights) const {

@@ -9,21 +9,22 @@
 
 namespace tether::ida_projection {
 
+class Polish;
+
 /// IDA's error test of the algebraic variables of index 1 that differential ones depend on: their
 /// tolerance is widened by what moves do to them; see algebraic_test.cpp.
 class AlgebraicTest {
  public:
   void begin(const std::vector<int>& variables);
   bool acts() const { return !variables_.empty(); }
-  /// An attempt that will be handed over, and the length of its move. `solved`: variables that rows
-  /// are solved for, ascending, which keep their tolerances. Returns whether these variables keep
-  /// IDA from doubling its step.
-  bool begin_attempt(const Attempt& attempt, const Candidate& candidate, double move,
-                     const std::vector<int>& solved);
+  /// Lowers the weights in an attempt that will be handed over, after a move of this length.
+  /// `solved`: variables that rows are solved for, ascending, which keep their tolerances. The
+  /// response of F to the move is asked of its polish where these variables keep IDA from doubling
+  /// its step.
+  void widen(const Attempt& attempt, const Candidate& candidate, double move,
+             const std::vector<int>& solved, Polish& polish, const Ida& ida);
   /// In the first step: whether their error has stayed although IDA has shortened the step.
   bool stay() const;
-  /// Lowers the weights. `response`: change of y by which F responds to the move; null: not known.
-  void widen(const Candidate& candidate, const double* response, const std::vector<int>& solved);
   /// The weights before widen(), in another attempt at the same step: IDA computes them anew for a
   /// new step only.
   void restore(N_Vector weights) const;
@@ -34,7 +35,7 @@ class AlgebraicTest {
     double weight = 0.0;    // IDA's, of the last attempt's step
     double response = 0.0;  // to a move by one tolerance, largest of the latest steps
   };
-  double widened(const Variable& v, double weight, double y) const;
+  double widened(const Variable& v, double y) const;
   void detect_jump(const Attempt& attempt);
 
   // The first attempt, the last one, and the first refused one since many in a row were accepted.

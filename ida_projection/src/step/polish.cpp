@@ -42,7 +42,11 @@ void Polish::keep(const Candidate& candidate) {
 
 // delta = -J^-1 F(t, ypred + ycor_N, yppred + cj ycor_N).
 bool Polish::newton_step(N_Vector ycor, N_Vector delta) {
-  if (corrector_.residual(ycor, delta) != 0) return false;
+  return corrector_.residual(ycor, delta) == 0 && solve(delta);
+}
+
+// F -> -J^-1 F
+bool Polish::solve(N_Vector delta) {
   ++statistics_.residual_evaluations;
   N_VScale(-1.0, delta, delta);
   return corrector_.solve_linear(delta);
@@ -56,15 +60,16 @@ bool Polish::know_noise() {
 // The same at ypred - dy: IDA's own callback adds ycor to IDA's ypred and yppred, so that ypred is
 // shifted for the call and put back bit for bit.
 bool Polish::newton_step_at_moved_point(const Candidate& candidate) {
-  N_VScale(1.0, candidate.base, work_);
-  if (double* const base = candidate.base_entries; base != nullptr) {
-    const double* const corrected = N_VGetArrayPointer(corrected_);
-    for (sunindextype j = 0, n = N_VGetLength(corrected_); j < n; ++j)
-      base[j] += candidate.correction_entries[j] - corrected[j];
-  } else {
-    N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
-    N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
+  if (const double* const base = candidate.base_entries; base != nullptr) {
+    const auto moved = [base, moved = candidate.correction_entries,
+                        corrected = N_VGetArrayPointer(corrected_)](std::size_t j) {
+      return base[j] + (moved[j] - corrected[j]);
+    };
+    return corrector_.residual_with(candidate, moved, corrected_, delta_) == 0 && solve(delta_);
   }
+  N_VScale(1.0, candidate.base, work_);
+  N_VLinearSum(1.0, candidate.correction, -1.0, corrected_, delta_);
+  N_VLinearSum(1.0, candidate.base, 1.0, delta_, candidate.base);
   const bool found = newton_step(corrected_, delta_);
   N_VScale(1.0, work_, candidate.base);
   return found;
@@ -137,9 +142,12 @@ void Polish::apply(const Candidate& candidate, double differential, double algeb
   if (variables_.any() && candidate.correction_entries != nullptr) {
     const double* const mask = variables_.mask();
     double* const delta = N_VGetArrayPointer(delta_);
-    for (sunindextype j = 0, n = N_VGetLength(delta_); j < n; ++j) {
+    double* const ycor = candidate.correction_entries;
+    const sunindextype n = N_VGetLength(delta_);
+    TETHER_ELEMENTWISE
+    for (sunindextype j = 0; j < n; ++j) {
       delta[j] *= mask[j] != 0.0 ? differential : algebraic;
-      candidate.correction_entries[j] += delta[j];
+      ycor[j] += delta[j];
     }
     return;
   }

@@ -170,6 +170,7 @@ class Polish {
     if (known_ == Known::noise_and_step) known_ = Known::noise;
   }
   bool newton_step(N_Vector ycor, N_Vector delta);
+  bool solve(N_Vector delta);
   bool newton_step_at_moved_point(const Candidate& candidate);
   bool forecast_polish(const Candidate& candidate, N_Vector ycor, double cj, double tolerance);
   void learn_pattern(const Candidate& candidate, N_Vector ycor, double cj);

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "step/polish.hpp"
-
 namespace tether::ida_projection {
 
 namespace {
@@ -37,16 +35,6 @@ void StepControl::restore(N_Vector weights, double factor) const {
 void StepControl::suppress_others(N_Vector tested, const std::vector<int>& coupled) {
   settings_.test(tested, true);
   algebraic_test_.begin(coupled);
-}
-
-void StepControl::test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
-                                 double move, const std::vector<int>& solved) {
-  const bool limits = algebraic_test_.begin_attempt(attempt, candidate, move, solved);
-  algebraic_test_.widen(candidate,
-                        limits && polish.iterations() > 0
-                            ? polish.response(candidate, ida_.step().residual)
-                            : nullptr,
-                        solved);
 }
 
 void StepControl::apply(const Control& control) {

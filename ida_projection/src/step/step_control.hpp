@@ -14,8 +14,6 @@
 
 namespace tether::ida_projection {
 
-class Polish;
-
 /// Smooth step sizes, the order limit and the test of algebraic variables, and the rejected steps
 /// that decide whether they begin.
 class StepControl {
@@ -46,8 +44,8 @@ class StepControl {
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
     if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance))
-      test_algebraic(attempt, candidate, polish, std::hypot(move, rows->solved_length()),
-                     rows->solved_for());
+      algebraic_test_.widen(attempt, candidate, std::hypot(move, rows->solved_length()),
+                            rows->solved_for(), polish, ida_);
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {
@@ -96,8 +94,6 @@ class StepControl {
   static constexpr int kTrapped = 10 * (kOftenRefused - 1);
 
   void restore(N_Vector weights, double factor) const;
-  void test_algebraic(const Attempt& attempt, const Candidate& candidate, Polish& polish,
-                      double move, const std::vector<int>& solved);
   void apply(const Control& control);
   void test_unmoved(const Attempt& attempt, double before, double after);
 

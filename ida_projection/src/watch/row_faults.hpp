@@ -146,7 +146,7 @@ class RowFaults {
       for (std::vector<double>* g :
            {&here_, &sides_[0], &sides_[1], &sides_[2], &sides_[3], &rates_})
         g->resize(run_.rows.size());
-      for (OwnedVector* each : {&work_, &base_, &ycor_}) *each = OwnedVector(at.candidate.base);
+      for (OwnedVector* each : {&work_, &ycor_}) *each = OwnedVector(at.candidate.base);
       evaluator_.reserve(static_cast<int>(n));
     }
     const double* predicted = N_VGetArrayPointer(at.candidate.predicted_slope);
@@ -219,13 +219,9 @@ class RowFaults {
   // Refines y' by one iteration for F at better_. It then contains neither the rest that IDA's
   // convergence test allows nor the distance from the constraints. ycor_ begins as the corrector's.
   bool refine_slope(const Corrected& at) {
-    double* const base = at.candidate.base_entries;
     double* const correction = N_VGetArrayPointer(ycor_);
-    N_VScale(1.0, at.candidate.base, base_);
-    for (std::size_t j = 0; j < better_.size(); ++j) base[j] = better_[j] - correction[j];
-    const bool known = at.corrector.residual(ycor_, work_) == 0;
-    N_VScale(1.0, base_, at.candidate.base);
-    if (!known) return false;
+    const auto base = [&](std::size_t j) { return better_[j] - correction[j]; };
+    if (at.corrector.residual_with(at.candidate, base, ycor_, work_) != 0) return false;
     N_VScale(-1.0, work_, work_);
     if (!at.corrector.solve_linear(work_)) return false;
     const double* delta = N_VGetArrayPointer(work_);
@@ -310,7 +306,7 @@ class RowFaults {
   std::vector<double> point_, slope_;      // y and y' as the corrector left them
   std::vector<double> better_, better_p_;  // the same, nearer to what F asks for
   std::vector<double> moved_, here_, sides_[4], rates_;
-  OwnedVector work_, base_, ycor_;
+  OwnedVector work_, ycor_;
 };
 
 }  // namespace tether::ida_projection

@@ -21,3 +21,12 @@
 #else
 #define TETHER_INLINE inline
 #endif
+
+// A loop whose arrays are the same or apart: no element depends on another one.
+#if defined(__clang__)
+#define TETHER_ELEMENTWISE _Pragma("clang loop vectorize(assume_safety)")
+#elif defined(__GNUC__)
+#define TETHER_ELEMENTWISE _Pragma("GCC ivdep")
+#else
+#define TETHER_ELEMENTWISE
+#endif
