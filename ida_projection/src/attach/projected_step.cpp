@@ -337,7 +337,7 @@ TETHER_INLINE Projection::Impl::Moved Projection::Impl::move_and_polish(const Ca
 // Polishing before the move saves one linear solve: the move removes what the polish violates. The
 // response of F to the move is then left out, so that this order is not taken where IDA's error
 // test of algebraic variables needs the response.
-bool Projection::Impl::polishes_first() const {
+TETHER_INLINE bool Projection::Impl::polishes_first() const {
   return in_use(Mechanism::polish_first) &&
          run_.last_move <= polish_.longest_without_response(control_.smoothing()) &&
          !control_.tests_algebraic() && (metric_choice_.calm() || !may_change_metric()) &&

@@ -43,9 +43,11 @@ class StepControl {
     // |ycor| decides the next step size, its ratio to the second difference the order.
     const auto norm = [&](N_Vector v) { return error_norm(v, candidate.weights, tested); };
     const bool engaged = std::isfinite(move);
-    if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance))
-      algebraic_test_.widen(attempt, candidate, std::hypot(move, rows->solved_length()),
+    if (engaged && algebraic_test_.acts() && in_use(Mechanism::widened_tolerance)) {
+      const double aside = rows->solved_length();
+      algebraic_test_.widen(attempt, candidate, aside > 0.0 ? std::hypot(move, aside) : move,
                             rows->solved_for(), polish, ida_);
+    }
     if (smoother_.on()) {
       apply(smoother_.control(attempt, norm(candidate.correction)));
     } else if (engaged) {
