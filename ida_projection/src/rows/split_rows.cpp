@@ -383,9 +383,9 @@ bool SplitRows::factor() {
 
 void SplitRows::solve_blocks(const std::vector<double>& g) {
   for (std::size_t k = 0; k < d.rows.size(); ++k) d.g[k] = g[at(d.rows[k])];
-  d.solve();
-  if (a.rows.empty()) return;
   const bool moves = !d.rows.empty();
+  if (moves) d.solve();
+  if (a.rows.empty()) return;
   if (moves) d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
   for (std::size_t k = 0; k < a.rows.size(); ++k)
     a.g[k] = g[at(a.rows[k])] - (moves ? C_.times(a.rows[k], d.columns, moved_.data()) : 0.0);

@@ -140,6 +140,7 @@ class RowFaults {
   // Tests C y' + g_t = 0 at the corrector's point, where y' satisfies F. C y' costs a product with
   // the present C; g is evaluated only for a row that stands out.
   std::string find_false_rows(const Corrected& at, RowsAt& rows) {
+    if (rows.age > 0) return {};
     const auto n = static_cast<std::size_t>(N_VGetLength(at.candidate.base));
     if (point_.size() != n) {  // all that a comparison needs, so that none allocates
       for (std::vector<double>* y : {&point_, &slope_, &better_, &better_p_, &moved_}) y->resize(n);
@@ -155,7 +156,7 @@ class RowFaults {
       point_[j] = at.candidate.base_entries[j] + ycor[j];
       slope_[j] = predicted[j] + at.attempt.cj * ycor[j];
     }
-    if (rows.age > 0 || !rows.tangency(slope_, at.id, tangency_)) return {};
+    if (!rows.tangency(slope_, at.id, tangency_)) return {};
     std::string text = find_one_sided_row(at.attempt.t);
     const double root = std::sqrt(static_cast<double>(n));
     for (std::size_t i = 0; i < tangency_.rate.size() && text.empty(); ++i) {
