@@ -227,6 +227,32 @@ TEST_CASE("a start that IDA finds by refusals: voltages stay in its error test")
   }
 }
 
+TEST_CASE("a first step that moves y' by its length over a short step: the corrector finds it") {
+  // A capacitor q behind a resistor; its power is quadratic in q'. Row: the work is in the charge.
+  constexpr double R = 0.1;
+  for (const double tolerance : {1e-4, 1e-6}) {
+    Problem p = tether::problems::start_problem(
+        "charging", "index 0", 1, 2.0, {0.5, 0.125 - 1e-3 * tolerance}, {5.0, 2.5}, {1.0, 1.0});
+    p.initial_step = 1e-10;
+    p.residual = [](double t, const double* y, const double* yp, double* r) {
+      r[0] = y[0] + R * yp[0] - std::cos(t);
+      r[1] = yp[1] - yp[0] * (std::cos(t) - R * yp[0]);
+    };
+    const tp::Constraints work = row(
+        "work", [](double, const double* y) { return y[1] - 0.5 * y[0] * y[0]; },
+        [](double, const double* y, double* C) {
+          C[0] = -y[0];
+          C[1] = 1.0;
+        });
+    const Run plain = integrate_plain(p, tolerance), run = integrate(p, tolerance, work);
+    INFO("tolerance " << tolerance << ": " << run.message);
+    REQUIRE(plain.flag >= 0);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.steps < 1.2 * plain.steps);
+    CHECK(std::abs(run.y[0] - plain.y[0]) < 10.0 * tolerance);
+  }
+}
+
 TEST_CASE("root finding: times of the lowest point, returned on the constraints") {
   const Problem problem = pendulum(1.0, 9.80665, 20.0, "index 1");
   const tp::Constraints rows = problem.recommended_constraints();

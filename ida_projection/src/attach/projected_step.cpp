@@ -281,7 +281,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
                       rows_.used->may_use_levels() && unknowns_.contiguous;
   if (!options_.suppress_algebraic) return structured;
   if (in_use(Mechanism::followers) && !variables_.high_index())
-    corrector_.expect_followers(variables_.id());
+    corrector_.wait(variables_.any() ? Corrector::Wait::always : Corrector::Wait::after_failures);
   if (in_use(Mechanism::free_multipliers)) corrector_.leave_out(variables_.undetermined());
   return structured;
 }

@@ -22,7 +22,7 @@ int Corrector::initialize() {
   failures_in_row_ = 0;
   rounding_fails_ = false;
   rounding_.clear();
-  expect_followers(nullptr);
+  wait(Wait::never);
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
@@ -35,13 +35,8 @@ N_Vector Corrector::reduced(N_Vector weights) {
   return weights_;
 }
 
-// Allocates all that test_convergence() needs. It is called through C functions of SUNDIALS and
-// must not throw.
-void Corrector::expect_followers(N_Vector differential) {
-  if (differential == differential_) return;
-  if (differential != nullptr && !before_) before_ = OwnedVector(differential);
-  differential_ = differential;
-  install_convergence_test();
+void Corrector::wait(Wait when) {
+  if (std::exchange(wait_, when) != when) install_convergence_test();
 }
 
 int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
@@ -52,28 +47,23 @@ int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
 
 // Installs IDA's own test if nothing has to be added to it.
 int Corrector::install_convergence_test() {
-  return differential_ != nullptr ? SUNNonlinSolSetConvTestFn(inner_, test_convergence, this)
-                                  : SUNNonlinSolSetConvTestFn(inner_, test_, test_data_);
+  return wait_ != Wait::never ? SUNNonlinSolSetConvTestFn(inner_, test_convergence, this)
+                              : SUNNonlinSolSetConvTestFn(inner_, test_, test_data_);
 }
 
-// IDA takes an iteration for divergent if a change is longer than 0.9 of the one before. The change
-// of algebraic variables is quadratic in that of the others (method, section 6). Where their first
-// change happens to be small the second one is longer, although the iteration converges.
+// IDA takes an iteration for divergent if a change is longer than 0.9 of the one before. What
+// follows other unknowns changes by the square of their changes (method, section 6). Where its
+// first change happens to be small, or wrong, the second one is as long, although the iteration
+// converges: it goes on to the third.
 int Corrector::test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                                 sunrealtype tolerance, N_Vector weights, void* self) {
-  Corrector& ours = *static_cast<Corrector*>(self);
+  const Corrector& ours = *static_cast<Corrector*>(self);
   const int flag = ours.test_(solver, ycor, change, tolerance, weights, ours.test_data_);
-  return flag == SUN_NLS_CONV_RECVR && ours.followers_move(ycor, change, tolerance, weights)
-             ? SUN_NLS_CONTINUE
-             : flag;
-}
-
-// Whether the differential variables have converged, by the rate of their last changes.
-bool Corrector::followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights) {
-  N_VLinearSum(1.0, ycor, -1.0, change, before_);
-  const double last = N_VWrmsNormMask(change, weights, differential_);
-  const double before = N_VWrmsNormMask(before_, weights, differential_);
-  return last < before && last * last <= tolerance * (before - last);
+  int changes_before = 0;
+  const bool waits = ours.wait_ == Wait::always || ours.failures_in_row_ >= kFailsAnyway;
+  const bool second = waits && flag == SUN_NLS_CONV_RECVR &&
+                      SUNNonlinSolGetCurIter(solver, &changes_before) == 0 && changes_before == 1;
+  return second ? SUN_NLS_CONTINUE : flag;
 }
 
 int Corrector::residual(N_Vector ycor, N_Vector into) {

@@ -46,16 +46,17 @@ class Corrector {
                                        tolerance, call_setup, mem_);
     SUNNonlinSolGetNumIters(inner_, &iterations_);
     failures_in_row_ = flag == 0 ? 0 : failures_in_row_ + 1;
-    if (failures_in_row_ >= 2) rounding_fails_ = true;
+    if (failures_in_row_ >= kFailsAnyway) rounding_fails_ = true;
     return flag;
   }
   /// If corrections fail although IDA has already cut the step for that, the convergence test from
   /// then on leaves out these algebraic variables of index 2 or more, in this run. Their rounding,
   /// divided by the step, fails the test, and no other variable depends on them.
   void leave_out(const std::vector<int>& rounding) { rounding_ = rounding; }
-  /// `differential`: 1 for differential variables, 0 for followers; null: there are no followers.
-  /// When the former have converged and followers still move, IDA's test waits instead of failing.
-  void expect_followers(N_Vector differential);
+  /// When IDA's test does not fail at the second change: where algebraic variables follow others,
+  /// or where corrections fail although IDA has cut the step.
+  enum class Wait { never, after_failures, always };
+  void wait(Wait when);
   /// F(t, ypred + ycor, yppred + cj ycor) through IDA's own callback; 0, or > 0: it cannot be
   /// evaluated. Once it asked for the end of the run it is not called again.
   int residual(N_Vector ycor, N_Vector into);
@@ -91,6 +92,8 @@ class Corrector {
   void forget_stop() { stop_flag_ = 0; }
 
  private:
+  static constexpr int kFailsAnyway = 2;  // failures in a row, between which IDA has cut the step
+
   Owned<SUNNonlinearSolver, SUNNonlinSolFree> own_;
   SUNNonlinearSolver inner_ = nullptr;
   SUNNonlinSolSysFn system_ = nullptr;
@@ -106,12 +109,10 @@ class Corrector {
                               sunrealtype tolerance, N_Vector weights, void* self);
   int install_convergence_test();
   N_Vector reduced(N_Vector weights);
-  bool followers_move(N_Vector ycor, N_Vector change, double tolerance, N_Vector weights);
 
   SUNNonlinSolConvTestFn test_ = nullptr;  // IDA's
   void* test_data_ = nullptr;
-  N_Vector differential_ = nullptr;
-  OwnedVector before_;
+  Wait wait_ = Wait::never;
   long iterations_ = 0;
   int failures_in_row_ = 0;
   bool rounding_fails_ = false;
