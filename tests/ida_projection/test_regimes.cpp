@@ -253,6 +253,43 @@ TEST_CASE("a first step that moves y' by its length over a short step: the corre
   }
 }
 
+TEST_CASE("an energy in voltages that are zero at the start: all charges move with it") {
+  // Two capacitors behind resistors of 1; W' is the power into them.
+  static constexpr double C[2] = {0.5, 1.0};
+  Problem p =
+      tether::problems::start_problem("ladder", "index 1", 2, 6.0, std::vector<double>(5, 0.0),
+                                      std::vector<double>(5, 0.0), {0.0, 0.0, 1.0, 1.0, 1.0});
+  p.residual = [](double t, const double* y, const double* yp, double* r) {
+    const double between = y[0] - y[1];
+    const double charging[2] = {2.0 * std::sin(2.0 * t) - y[0] - between, between - y[1]};
+    r[4] = yp[4];
+    for (int i = 0; i < 2; ++i) {
+      r[i] = yp[2 + i] - charging[i];
+      r[2 + i] = C[i] * y[i] - y[2 + i];
+      r[4] -= y[i] * charging[i];
+    }
+  };
+  const std::vector<double> exact = integrate_plain(p, 1e-11).y;
+  p.atol_scale = {0.1, 0.1, 1.0, 1.0, 1.0};
+  const tp::Constraints energy = row(
+      "energy",
+      [](double, const double* y) {
+        return y[4] - 0.5 * (C[0] * y[0] * y[0] + C[1] * y[1] * y[1]);
+      },
+      [](double, const double* y, double* slope) {
+        for (int i = 0; i < 2; ++i) slope[i] = -C[i] * y[i];
+        slope[4] = 1.0;
+      });
+  for (const double tolerance : {1e-6, 1e-8}) {
+    const Run run = integrate(p, tolerance, energy);
+    REQUIRE(run.flag >= 0);
+    for (std::size_t i = 0; i < 5; ++i) {
+      INFO("y[" << i << "] at tolerance " << tolerance << ": " << run.y[i] << ", " << exact[i]);
+      CHECK(std::abs(run.y[i] - exact[i]) <= 10.0 * tolerance);
+    }
+  }
+}
+
 TEST_CASE("root finding: times of the lowest point, returned on the constraints") {
   const Problem problem = pendulum(1.0, 9.80665, 20.0, "index 1");
   const tp::Constraints rows = problem.recommended_constraints();

@@ -20,6 +20,7 @@ namespace {
 using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double kRestricts = 1e-2;  // of a row: the candidate is off the set by its own error
+constexpr double kGrown = 1e-3;      // of a row: entries that are next to nothing here may grow
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
@@ -148,6 +149,7 @@ class Span {
 struct Point {
   std::vector<double> y;
   Dense C, h;
+  Dense grown;         // C with algebraic entries of at least kGrown, unless they are exactly zero
   bool hangs = false;  // some row contains an algebraic variable, however weakly
   linalg::LeastSquares factors{kQuotientRounding};  // of h_a^T
 
@@ -155,9 +157,18 @@ struct Point {
                      const std::vector<int>& free, const std::vector<int>& algebraic) {
     C = Dense::Zero(rows.rows(), static_cast<Eigen::Index>(y.size()));
     const auto n = static_cast<int>(y.size());
-    if (rows.jacobian(t, y.data(), n, WT.data(), free, C.data()) != Status::success) return false;
-    for (const int j : algebraic) hangs = hangs || (C.col(j).array() != 0.0).any();
-    return finish(&C, WT, free);
+    std::vector<double> fine(WT);  // differences over a tolerance are not good to kQuotientRounding
+    for (double& change : fine) change *= kWideIncrement;
+    if (rows.jacobian(t, y.data(), n, fine.data(), free, C.data()) != Status::success) return false;
+    grown = C;
+    if (!finish(&C, WT, free)) return false;
+    for (Eigen::Index i = 0; i < C.rows(); ++i)
+      for (const int j : algebraic) {
+        double& entry = grown(i, j);
+        hangs = hangs || entry != 0.0;
+        if (entry != 0.0) entry = std::copysign(std::max(kGrown, std::abs(C(i, j))), entry);
+      }
+    return true;
   }
   bool evaluate_equations(const Residual& residual, const std::vector<int>& equations,
                           const std::vector<double>& WT, const std::vector<int>& free,
@@ -176,10 +187,11 @@ struct Point {
     factors.factor(part.transpose());
     return true;
   }
-  // False: h leaves something of the row's algebraic part.
-  bool explain(int row, const std::vector<int>& algebraic, Eigen::VectorXd* x) const {
+  // False: h leaves something of the algebraic part of this row, of C or grown.
+  bool explain(const Dense& rows, int row, const std::vector<int>& algebraic,
+               Eigen::VectorXd* x) const {
     Eigen::VectorXd part(static_cast<Eigen::Index>(algebraic.size()));
-    for (Eigen::Index k = 0; k < part.size(); ++k) part[k] = C(row, algebraic[at(k)]);
+    for (Eigen::Index k = 0; k < part.size(); ++k) part[k] = rows(row, algebraic[at(k)]);
     *x = factors.solve(part);
     const double largest = x->size() > 0 ? x->lpNorm<Eigen::Infinity>() : 0.0;
     for (double& share : *x)
@@ -257,21 +269,28 @@ static std::vector<char> repeat_equations(Evaluator& rows, const Residual& resid
 }
 
 // Those of the rows `which` that constrain the differential variables in a direction that is not in
-// `plain`, and for each equation whether such a row needs it.
+// `plain`, and for each equation whether such a row needs it, or will need it where entries grow.
 static std::pair<std::vector<int>, std::vector<char>> rows_in_new_directions(
     const std::vector<int>& which, const Span& plain, const std::vector<int>& algebraic,
     const Point& away, const Point& here) {
   std::vector<int> rows;
   std::vector<char> used(at(here.h.rows()), 0);
+  Eigen::VectorXd x, x_here;
+  const auto explained = [&](int i, const Dense Point::*C) {
+    return away.explain(away.*C, i, algebraic, &x) && here.explain(here.*C, i, algebraic, &x_here);
+  };
+  const auto use = [&] {
+    for (Eigen::Index e = 0; e < x.size(); ++e)
+      if (x[e] != 0.0 || x_here[e] != 0.0) used[at(e)] = 1;
+  };
   for (int i : which) {
-    Eigen::VectorXd x, x_here;
-    if (!away.explain(i, algebraic, &x) || !here.explain(i, algebraic, &x_here)) continue;
+    if (!explained(i, &Point::C)) continue;
     Eigen::VectorXd reduced = here.C.row(i).transpose() - here.h.transpose() * x_here;
     for (int j : algebraic) reduced[j] = 0.0;
     if (!(plain.rest(reduced).norm() > kRestricts * (1.0 + x_here.norm()))) continue;
     rows.push_back(i);
-    for (Eigen::Index e = 0; e < x.size(); ++e)
-      if (x[e] != 0.0 || x_here[e] != 0.0) used[at(e)] = 1;
+    use();
+    if (explained(i, &Point::grown)) use();
   }
   return {rows, used};
 }
@@ -287,7 +306,7 @@ static std::vector<char> algebraic_in(
       for (int j : algebraic)
         if (a(i, j) != 0.0) found[at(j)] = 1;
     };
-    for (int i : rows) mark(point.C, i);
+    for (int i : rows) mark(point.grown, i);
     for (std::size_t e = 0; e < used.size(); ++e)
       if (used[e]) mark(point.h, static_cast<int>(e));
   }
@@ -324,7 +343,7 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
     if (id[j] == 0.0) algebraic.push_back(j);
   }
   // Away from the candidate structural entries are not zero; at the candidate they have their size.
-  Point away{further_away(y, WT), {}, {}}, here{y, {}, {}};
+  Point away{further_away(y, WT), {}, {}, {}}, here{y, {}, {}, {}};
   if (algebraic.empty() || !here.evaluate_rows(rows, t, WT, free, algebraic)) return found;
   if (!away.evaluate_rows(rows, t, WT, free, algebraic)) {
     away.y = some_tolerances_away(y, WT);
