@@ -2,7 +2,6 @@
 // BSD-3-Clause
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -17,7 +16,6 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr int kSignPatterns = 4;
 constexpr double kFollows = 0.25;  // of Options::tolerance: dropped rows may ask for such a move
 constexpr int kFew = 16;           // rows: their moves are not rough
 constexpr int kEarly = 16;         // decisions about the rank in which rates are looked for
@@ -36,8 +34,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
         reported_(static_cast<std::size_t>(reported >= 0 ? reported : evaluator_.rows())),
         inverse_n_(1.0 / size),
         y_(static_cast<std::size_t>(size), 0.0),
-        g_(static_cast<std::size_t>(evaluator_.rows()), 0.0),
-        kept_g_(g_) {}
+        g_(static_cast<std::size_t>(evaluator_.rows()), 0.0) {}
 
   TETHER_INLINE Status load(const Candidate& candidate, bool refills) override {
     place(candidate);
@@ -100,8 +97,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   }
   double solved_length() const override { return solved_; }
   bool leaves_no_choice() const { return rows_.leave_no_choice(); }
-  bool is_rounding(double move = kAnyMove) override {
-    if (std::isfinite(move)) return move <= rounding_length();
+  bool is_rounding() override {
     for (std::size_t i = 0; i < static_cast<std::size_t>(count()); ++i)
       if (!(std::abs(g_[i]) <= kRoundingOfTerms * rows_.C().terms(static_cast<int>(i), y_.data())))
         return false;
@@ -428,25 +424,6 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     length_ = found.length;
     return found;
   }
-  // Length of the move that the rounding of g asks for in the worst case, with the current factors:
-  // at most sum_i |dy_i|, dy_i the move for row i alone, and so sqrt(m sum_i |dy_i|^2), the sum of
-  // squares by moves for all rows with random signs.
-  double rounding_length() {
-    std::uint32_t random = 1;
-    double squares = 0.0;
-    for (int pattern = 0; pattern < kSignPatterns; ++pattern) {
-      for (std::size_t i = 0; i < static_cast<std::size_t>(count()); ++i) {
-        random = 1664525u * random + 1013904223u;  // Numerical Recipes, section 7.1
-        const double rounding = 8.0 * kEpsilon * rows_.C().terms(static_cast<int>(i), y_.data());
-        kept_g_[i] = random >> 31 != 0 ? rounding : -rounding;
-      }
-      rows_.solve(kept_g_);
-      ++statistics_.iterations;
-      squares += square(length_of_solution());
-    }
-    rows_.solve(g_);
-    return std::sqrt(squares / kSignPatterns * count());
-  }
   static void take(double share, const double* __restrict dy, int n, double* __restrict ycor,
                    double* __restrict y) {
     for (int k = 0; k < n; ++k) {
@@ -463,14 +440,14 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   double inverse_n_;
   Candidate at_{};
   std::vector<double> y_, WT_, g_;
-  std::vector<double> kept_g_, shifted_;  // work space
-  double t_ = 0.0, length_ = 0.0;         // of the last evaluation and solution
-  double solved_ = 0.0;                   // the longest length_of_solved() of this candidate
-  bool rows_known_ = false;               // C belongs to the present y
-  bool thin_ = false;                     // some of the factored rows need RowTrust
-  bool lasting_ = false;                  // the choice of rows is right for the next steps, too
-  bool decided_ = false;                  // it was made for this candidate
-  bool moved_ = false;                    // this candidate
+  std::vector<double> shifted_;    // work space
+  double t_ = 0.0, length_ = 0.0;  // of the last evaluation and solution
+  double solved_ = 0.0;            // the longest length_of_solved() of this candidate
+  bool rows_known_ = false;        // C belongs to the present y
+  bool thin_ = false;              // some of the factored rows need RowTrust
+  bool lasting_ = false;           // the choice of rows is right for the next steps, too
+  bool decided_ = false;           // it was made for this candidate
+  bool moved_ = false;             // this candidate
   int decisions_ = 0;
   double usual_ = 0.0;  // asked for by dropped rows after the moves, when that was decided
   std::optional<std::vector<int>> levels_;  // of the rows as they are arranged

@@ -269,11 +269,15 @@ class Newton : public RowsAt {
     if (age > 0) run_.rate = ratio;
     if (ratio <= (age > 0 ? kShrinks : 0.5)) {
       if (length * ratio <= tolerance) return Verdict::done;
-      return last ? Verdict::failed : Verdict::go_on;
+      if (!last) return Verdict::go_on;
+    } else if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, tolerance)})) {
+      return Verdict::done;
+    } else if (!fresh && !last) {
+      return Verdict::refactor;
     }
-    // Lengths no longer halve: rounding is reached, or the iteration does not converge.
-    if (length <= std::max({floor, 1e-5, 0.1 * std::min(1.0, tolerance)})) return Verdict::done;
-    return fresh || last ? Verdict::failed : Verdict::refactor;
+    // Lengths no longer halve. Rounding, and differences in place of C, leave that much where rows
+    // are nearly parallel; more is no convergence.
+    return length <= kLargestFloor ? Verdict::done : Verdict::failed;
   }
 
   // After a move: whether Newton's method has ended. A status other than success means that it
@@ -286,10 +290,6 @@ class Newton : public RowsAt {
                              ? 0.0
                              : std::min(kLargestFloor, 1e3 * rounding_of(candidate));
     *verdict = judge(length, previous, result, fresh, floor);
-    // Nearly parallel rows magnify rounding. A move that rounding explains has converged.
-    if ((*verdict == Verdict::failed || *verdict == Verdict::refactor) && length <= kLargestFloor &&
-        self().is_rounding(length))
-      *verdict = Verdict::done;
     // If g is rounding the move is meaningless, however long it is.
     if (*verdict == Verdict::failed && self().is_rounding()) {
       result.status = self().apply(-1.0, candidate);

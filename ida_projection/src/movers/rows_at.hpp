@@ -60,7 +60,6 @@ class RowsAt {
   /// How the rows are given. A projection of the caller's own has no g and is one solution.
   enum class Kind { entries, vectors, projection };
   enum class Factors { none, of_some_rows, of_all_rows };
-  static constexpr double kAnyMove = std::numeric_limits<double>::infinity();
 
   explicit RowsAt(Kind of_rows) : kind(of_rows) {}
   virtual ~RowsAt() = default;
@@ -95,9 +94,8 @@ class RowsAt {
   virtual Solution solve(Solve how) = 0;
   /// y and the correction move by -share dy.
   virtual Status apply(double share, const Candidate& candidate) = 0;
-  /// Whether rounding explains a move of this length, by the factors; of any length: every g_i, by
-  /// its own terms.
-  virtual bool is_rounding(double move = kAnyMove) = 0;
+  /// Whether rounding explains every g_i, by its own terms.
+  virtual bool is_rounding() = 0;
 
   /// y follows the correction, which has changed by `change` (null: by anything). Returns the
   /// length of the change over the variables of the error test, in tolerances.

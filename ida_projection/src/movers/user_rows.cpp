@@ -42,7 +42,7 @@ class UserRows final : public Newton<UserRows> {
     N_VLinearSum(1.0, candidate.correction, share, change_, candidate.correction);
     return Status::success;
   }
-  bool is_rounding(double = kAnyMove) override { return false; }
+  bool is_rounding() override { return false; }
   double follow(const Candidate&, N_Vector change) override {
     return change != nullptr ? N_VWrmsNorm(change, at_.weights) : 0.0;
   }

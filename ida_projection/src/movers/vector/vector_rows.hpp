@@ -80,9 +80,7 @@ class VectorRows : public Newton<VectorRows<Store>> {
     N_VLinearSum(1.0, y_, -share, dy_, y_);
     return Status::success;
   }
-  bool is_rounding(double move = RowsAt::kAnyMove) override {
-    return !std::isfinite(move) && rows_.rounding_only();
-  }
+  bool is_rounding() override { return rows_.rounding_only(); }
 
   double follow(const Candidate& candidate, N_Vector change) override {
     if (change == nullptr) {
