@@ -225,6 +225,33 @@ TEST_CASE("almost parallel rows: moves of a thousandth of a tolerance that stay 
   CHECK(run.steps < 100);  // plain IDA: 64
 }
 
+TEST_CASE("rows that touch each other: energy and angular momentum of a circular orbit") {
+  const Problem problem = ode({1.0, 0.0, 0.0, 1.0}, 20.0, [](double, const double* y, double* f) {
+    const double cube = std::pow(std::hypot(y[0], y[1]), 3);
+    for (int i = 0; i < 2; ++i) {
+      f[i] = y[2 + i];
+      f[2 + i] = -y[i] / cube;
+    }
+  });
+  tp::Constraints rows;
+  rows.count = 2;
+  rows.value = [](double, tp::ConstVector y, tp::Vector g) {
+    g[0] = 0.5 * (y[2] * y[2] + y[3] * y[3]) - 1.0 / std::hypot(y[0], y[1]) + 0.5;
+    g[1] = y[0] * y[3] - y[1] * y[2] - 1.0;
+  };
+  for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
+    const Run run = integrate(problem, tolerance, rows, {}, false);
+    const Run plain = integrate_plain(problem, tolerance);
+    INFO("tolerance " << tolerance << ": " << run.message);
+    REQUIRE(run.flag >= 0);
+    CHECK(static_cast<double>(run.steps) < 1.5 * static_cast<double>(plain.steps));
+    const auto error = [](const Run& of) {
+      return std::hypot(of.y[0] - std::cos(20.0), of.y[1] - std::sin(20.0));
+    };
+    CHECK(error(run) < 0.5 * error(plain));
+  }
+}
+
 TEST_CASE("inconsistent rows: refused at once, by name") {
   for (const double square : {2.0, 1.0 + 1e-3}) {
     INFO("second circle: " << square);

@@ -313,6 +313,11 @@ TETHER_INLINE Projection::Impl::Moved Projection::Impl::move_and_polish(const Ca
   polish_.keep(candidate);
   Move& move = moved;
   move = rows_.used->move(candidate);
+  // Rows that touch each other have no common point next to the one where they do.
+  while (move.status == Status::not_converged && rows_.used->leave_out_weakest()) {
+    polish_.restore(candidate);
+    move = rows_.used->move(candidate);
+  }
   if (move.capped) {
     judge_capped(move);
     return moved;  // the steps below would make the whole move

@@ -17,6 +17,7 @@ namespace tether::ida_projection {
 namespace {
 
 constexpr double kFollows = 0.25;  // of Options::tolerance: dropped rows may ask for such a move
+constexpr double kWeak = 0.1;      // independent part below which a row may be left out
 constexpr int kFew = 16;           // rows: their moves are not rough
 constexpr int kEarly = 16;         // decisions about the rank in which rates are looked for
 constexpr double kAlike = 0.05;    // relative change of a sum of squares
@@ -40,6 +41,8 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     place(candidate);
     if (!refills) metric_.find(at_);
     decided_ = moved_ = false;
+    least_ = 1.0;
+    if (--without_ < 0) left_out_ = 0;
     solved_ = 0.0;
     return rows_.structured() ? Status::success : structure(candidate.t, nullptr);
   }
@@ -123,7 +126,18 @@ class ContiguousRows final : public Newton<ContiguousRows> {
         [&](int, int j) { sum += square(at_.correction_entries[j] * at_.weight_entries[j]); });
     return wrms(sum);
   }
-  bool contradicts() override { return drops_rows() && rows_.contradict(WT()); }
+  bool contradicts() override {
+    const bool found = drops_rows() && rows_.contradict(WT());
+    if (found) left_out_ = 0;
+    return found;
+  }
+  bool leave_out_weakest() override {
+    if (rows_.C().sparse() || counted().rank() < 2 || least_ > kWeak) return false;
+    left_out_ = counted_rows() - counted().rank() + 1;
+    without_ = kOneIn;
+    factors = Factors::none;
+    return true;
+  }
   void refresh_pattern_soon() override { rows_.refresh_pattern_soon(); }
 
   Status set_algebraic(const Candidate& candidate, N_Vector id,
@@ -143,7 +157,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     metric_.reset();
     rows_.trust.reset();
     usual_ = 0.0;
-    decisions_ = 0;
+    decisions_ = left_out_ = 0;
     levels_.reset();
   }
   bool use_levels(bool on) override {
@@ -235,6 +249,8 @@ class ContiguousRows final : public Newton<ContiguousRows> {
 
  private:
   int unknowns() const { return static_cast<int>(y_.size()); }
+  linalg::MinimumNorm& counted() { return rows_.counted().dense; }
+  int counted_rows() { return static_cast<int>(rows_.counted().rows.size()); }
   bool drops_rows() const { return factors != Factors::of_all_rows && rows_.drops_rows(); }
   double wrms(double sum) const { return std::sqrt(sum * inverse_n_); }
   TETHER_INLINE void fill_metric() {
@@ -284,9 +300,12 @@ class ContiguousRows final : public Newton<ContiguousRows> {
       report.text = "the constraint Jacobian C has an entry that is not finite at t = " + brief(t);
       return Status::not_finite;
     }
+    if (left_out_ > 0) counted().use_rank(counted_rows() - left_out_);
+    if (!rows_.C().sparse() && counted().rank() > 0)
+      least_ = std::min(least_, counted().independent_part(counted().rank() - 1));
     const bool drops = rows_.drops_rows();
     if (drops) ++statistics_.rank_drops;
-    thin_ = in_use(Mechanism::row_trust) && !rows_.C().sparse() &&
+    thin_ = left_out_ == 0 && in_use(Mechanism::row_trust) && !rows_.C().sparse() &&
             RowTrust::has_thin_rows(rows_.counted().dense);
     lasting_ = !thin_;
     decided_ = true;
@@ -440,14 +459,16 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   double inverse_n_;
   Candidate at_{};
   std::vector<double> y_, WT_, g_;
-  std::vector<double> shifted_;    // work space
-  double t_ = 0.0, length_ = 0.0;  // of the last evaluation and solution
-  double solved_ = 0.0;            // the longest length_of_solved() of this candidate
-  bool rows_known_ = false;        // C belongs to the present y
-  bool thin_ = false;              // some of the factored rows need RowTrust
-  bool lasting_ = false;           // the choice of rows is right for the next steps, too
-  bool decided_ = false;           // it was made for this candidate
-  bool moved_ = false;             // this candidate
+  std::vector<double> shifted_;     // work space
+  double t_ = 0.0, length_ = 0.0;   // of the last evaluation and solution
+  double solved_ = 0.0;             // the longest length_of_solved() of this candidate
+  bool rows_known_ = false;         // C belongs to the present y
+  bool thin_ = false;               // some of the factored rows need RowTrust
+  bool lasting_ = false;            // the choice of rows is right for the next steps, too
+  bool decided_ = false;            // it was made for this candidate
+  bool moved_ = false;              // this candidate
+  double least_ = 1.0;              // least independent part of a row at this candidate
+  int left_out_ = 0, without_ = 0;  // weak rows, and candidates to come without them
   int decisions_ = 0;
   double usual_ = 0.0;  // asked for by dropped rows after the moves, when that was decided
   std::optional<std::vector<int>> levels_;  // of the rows as they are arranged

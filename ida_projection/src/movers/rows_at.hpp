@@ -104,6 +104,9 @@ class RowsAt {
   virtual double corrected() const = 0;
   /// Whether dropped rows contradict the kept ones; reported then.
   virtual bool contradicts() { return false; }
+  /// Moves do not converge. Whether the row that is least independent of the others is left out, at
+  /// this candidate and some to come.
+  virtual bool leave_out_weakest() { return false; }
   /// Moves failed: perhaps entries of C are missing that g could not fill before.
   virtual void refresh_pattern_soon() {}
 
