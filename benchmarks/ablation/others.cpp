@@ -105,6 +105,23 @@ problems::Problem titration() {
   return p;
 }
 
+// In the plane; energy and angular momentum, whose gradients are parallel on a circle.
+problems::Problem circular_orbit() {
+  problems::Problem p =
+      explicit_problem("circular orbit", 20.0, {1, 0, 0, 1}, [](const double* y, double* f) {
+        const double r = std::hypot(y[0], y[1]);
+        for (int i = 0; i < 2; ++i) {
+          f[i] = y[2 + i];
+          f[2 + i] = -y[i] / (r * r * r);
+        }
+      });
+  keep(&p, 2, [](double, const double* y, double* g) {
+    g[0] = (y[2] * y[2] + y[3] * y[3]) / 2 - 1.0 / std::hypot(y[0], y[1]);
+    g[1] = y[0] * y[3] - y[1] * y[2];
+  });
+  return p;
+}
+
 // In the plane; energy, momentum and angular momentum.
 problems::Problem three_bodies() {
   static constexpr double kMass[3] = {1.0, 0.8, 0.5};
@@ -273,7 +290,8 @@ std::vector<problems::Problem> chains_of_rods() {
 }
 
 std::vector<problems::Problem> others() {
-  std::vector<problems::Problem> all = {arm(), titration(), three_bodies(), top(), toda()};
+  std::vector<problems::Problem> all = {arm(),          titration(), circular_orbit(),
+                                        three_bodies(), top(),       toda()};
   for (problems::Problem& p : all) {
     p.reference.assign(p.y0.size(), 0.0);
     p.reference = integrate(p, 1e-12).y;

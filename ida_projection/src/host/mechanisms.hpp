@@ -24,6 +24,7 @@ enum class Mechanism {
   stricter_setpoint,      ///< smaller errors in index 2, by tolerance and order
   tested_long_moves,      ///< the error test sees the correction before a long move, too
   row_trust,              ///< thin rows count only as far as C can be trusted
+  rows_left_out,          ///< the least independent row, where moves onto all do not converge
   kept_rank,              ///< independent rows are determined now and then only
   tests_before_moves,     ///< g alone shows that rows need no move
   rate_limit,             ///< scales of positions are at most h times those of velocities
@@ -35,11 +36,10 @@ enum class Mechanism {
 };
 
 inline constexpr const char* kMechanismNames[] = {
-    "repeated correction", "polish first",      "forecast polish",
-    "followers",           "free multipliers",  "widened tolerance",
-    "index in trouble",    "stricter setpoint", "tested long moves",
-    "row trust",           "kept rank",         "tests before moves",
-    "rate limit",          "other metric",      "expected oscillations",
+    "repeated correction", "polish first",      "forecast polish",  "followers",
+    "free multipliers",    "widened tolerance", "index in trouble", "stricter setpoint",
+    "tested long moves",   "row trust",         "rows left out",    "kept rank",
+    "tests before moves",  "rate limit",        "other metric",     "expected oscillations",
     "joined equations",    "false-row watch"};
 static_assert(sizeof kMechanismNames / sizeof *kMechanismNames ==
               static_cast<std::size_t>(Mechanism::count));

@@ -132,7 +132,9 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     return found;
   }
   bool leave_out_weakest() override {
-    if (rows_.C().sparse() || counted().rank() < 2 || least_ > kWeak) return false;
+    if (!in_use(Mechanism::rows_left_out) || rows_.C().sparse() || counted().rank() < 2 ||
+        least_ > kWeak)
+      return false;
     left_out_ = counted_rows() - counted().rank() + 1;
     without_ = kOneIn;
     factors = Factors::none;
