@@ -93,6 +93,24 @@ TEST_CASE("an entry of C that is wrong by a factor 2 is named") {
   CHECK(count(end.printed, "check_jacobian") >= 1);
 }
 
+TEST_CASE("C too large by a factor is named: moves that shrink slowly have not converged") {
+  for (const double factor : {2.0, 3.0, 10.0, 1000.0}) {
+    INFO("factor " << factor);
+    const Ended end =
+        run(circle(50.0), 1e-5,
+            row(
+                "circle",
+                [](double, const double* y) { return (y[0] * y[0] + y[1] * y[1] - 1.0) / 2.0; },
+                [factor](double, const double* y, double* c) {
+                  c[0] = factor * y[0];
+                  c[1] = factor * y[1];
+                }),
+            3000);
+    CHECK(end.status != tp::Status::success);
+    CHECK(contains(end.message, "check_jacobian"));
+  }
+}
+
 TEST_CASE("a long collapse is explained once, restarts and all") {
   const Problem problem = swing(100.0);
   Host host(problem, 1e-6);

@@ -187,6 +187,64 @@ TEST_CASE("gradients that write past their count end the run by name") {
   CHECK(contains(end.message, "writes past its end: Constraints::count is 1"));
 }
 
+namespace {
+
+// (cos t, sin t, 1)
+Problem circle_beside_z() {
+  return ode({1.0, 0.0, 1.0}, 12.0, [](double, const double* y, double* f) {
+    f[0] = -y[1];
+    f[1] = y[0];
+    f[2] = 0.0;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("rows that leave g and C alone while they are off: the steps without them") {
+  tp::Constraints dense;
+  dense.count = 1;
+  dense.value = [](double t, tp::ConstVector y, tp::Vector g) {
+    if (t > 100.0) g[0] = y[2] - 1.0;
+  };
+  dense.jacobian = tp::DenseJacobian([](double t, tp::ConstVector, tp::Matrix C) {
+    if (t > 100.0) C(0, 2) = 1.0;
+  });
+  tp::Constraints differences = dense;
+  differences.jacobian = tp::FiniteDifferences();
+  const Run without = integrate(circle_beside_z(), 1e-6, on_circle());
+  for (const tp::Constraints& off : {dense, differences})
+    for (const tp::Constraints& rows : {on_circle() + off, off + on_circle()}) {
+      const Run run = integrate(circle_beside_z(), 1e-6, rows, {}, false);
+      INFO(run.message);
+      REQUIRE(run.flag >= 0);
+      CHECK(run.steps == without.steps);
+      CHECK(run.y[2] == 1.0);
+    }
+}
+
+TEST_CASE("gradients that leave g alone while they are off") {
+  const auto along = [](bool z) {
+    tp::Gradients gradients;
+    gradients.value = [z](double, N_Vector y, double* g) {
+      const double* x = N_VGetArrayPointer(y);
+      if (!z) g[0] = (x[0] * x[0] + x[1] * x[1] - 1.0) / 2.0;
+    };
+    gradients.fill = [z](double, N_Vector y, N_Vector* rows) {
+      const double* x = N_VGetArrayPointer(y);
+      double* C = N_VGetArrayPointer(rows[0]);
+      for (int j = 0; j < 3; ++j) C[j] = j == 2 ? z : z ? 0.0 : x[j];
+    };
+    tp::Constraints set;
+    set.count = 1;
+    set.jacobian = gradients;
+    return set;
+  };
+  const Run run = integrate(circle_beside_z(), 1e-6, along(false) + along(true), {}, false);
+  INFO(run.message);
+  REQUIRE(run.flag >= 0);
+  CHECK(run.y[2] == 1.0);
+}
+
 TEST_CASE("calls of the plugin from its own callbacks are refused by name") {
   Host host(tether::test::circle(20.0), 1e-6);
   int calls = 0;

@@ -88,12 +88,10 @@ void Evaluator::flatten(const Constraints& set) {
   for (const Constraints& part : set.joined) flatten(part);
 }
 
-double* Evaluator::room_for_first_C(const Part& part, int n) {
+double* Evaluator::room_for_first_C(const Part& part, int n, const double* C) {
   const std::ptrdiff_t entries = part.entries(n);
   C_room_.reserve(entries, entries + n);
-  double* const room = C_room_.open(entries);
-  std::fill_n(room, entries, 0.0);
-  return room;
+  return C_room_.open(C, entries);
 }
 
 TETHER_INLINE int Evaluator::value_of(const Part& part, double t, const double* y, int n,

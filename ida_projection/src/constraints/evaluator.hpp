@@ -42,10 +42,13 @@ class GuardedRoom {
     const auto size = static_cast<std::size_t>(count + std::max(more, kLeast));
     if (room_.size() < size) room_.resize(size);
   }
-  /// To be written: so many values, at most as many as were reserved.
-  double* open(std::ptrdiff_t count) {
-    std::memcpy(room_.data() + count, kUnwritten, sizeof kUnwritten);
-    return room_.data();
+  /// To be written: so many values, at most as many as were reserved. It has these at first, which
+  /// a callback may leave alone.
+  double* open(const double* values, std::ptrdiff_t count) {
+    double* const room = room_.data();
+    for (std::ptrdiff_t i = 0; i < count; ++i) room[i] = values[i];
+    std::memcpy(room + count, kUnwritten, sizeof kUnwritten);
+    return room;
   }
   /// Copies what was written and adds it to `sum`. False: there was more.
   bool close(double* values, std::ptrdiff_t count, double& sum) const {
@@ -54,8 +57,8 @@ class GuardedRoom {
     sum += added;
     return std::memcmp(room_.data() + count, kUnwritten, sizeof kUnwritten) == 0;
   }
-  /// call(to) writes `count` values, which are copied to `values`. Returns its flag, or that it has
-  /// written more.
+  /// call(to) writes `count` values, which are copied to `values`; `to` has these at first. Returns
+  /// its flag, or that it has written more.
   template <class Call>
   int written(double* values, std::ptrdiff_t count, std::ptrdiff_t more, Call&& call);
 
@@ -74,7 +77,7 @@ constexpr double kContradicts = 0.5;
 template <class Call>
 int GuardedRoom::written(double* values, std::ptrdiff_t count, std::ptrdiff_t more, Call&& call) {
   reserve(count, more);
-  const int flag = call(open(count));
+  const int flag = call(open(values, count));
   double sum = 0.0;
   return close(values, count, sum) ? flag : kOverran;
 }
@@ -198,17 +201,17 @@ class Evaluator {
   TETHER_INLINE int write_g(const Part& part, int n, double* g, Fill&& fill) {
     if (n > reserved_) reserve(n);
     const int count = part.set->count;
-    const int flag = fill(g_room_.open(count));
+    const int flag = fill(g_room_.open(g, count));
     return g_room_.close(g, count, sum_) ? flag : kOverran;
   }
   template <class Fill>
   TETHER_INLINE int write_C(const Part& part, int n, double* C, Fill&& fill) {
-    double* const into = part.C_checked ? C : room_for_first_C(part, n);
+    double* const into = part.C_checked ? C : room_for_first_C(part, n, C);
     const int flag = fill(into);
     if (into != C) part.C_checked = C_room_.close(C, part.entries(n), sum_);
     return part.C_checked ? flag : kOverran;
   }
-  double* room_for_first_C(const Part& part, int n);
+  double* room_for_first_C(const Part& part, int n, const double* C);
   /// call(part) for all sets, until one fails; `what` names the callback.
   template <class Call>
   Status each(const char*& what, Call&& call);

@@ -19,7 +19,7 @@ bool Corrector::is_reached_by(const Ida& ida) {
 }
 
 int Corrector::initialize() {
-  failures_in_row_ = 0;
+  iterations_ = failures_in_row_ = 0;
   rounding_fails_ = false;
   rounding_.clear();
   wait(Wait::never);

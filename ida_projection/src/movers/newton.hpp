@@ -158,6 +158,7 @@ class Newton : public RowsAt {
 
  private:
   static constexpr double kLargestFloor = 0.1;  // tolerances
+  static constexpr double kStays = 3e-3;        // tolerances that may be left for good
   static constexpr int kUnneededMoves = 8;      // moves below kNothing in a row, then tests begin
   static constexpr double kShrinks = 0.1;  // of a move: earlier factors that leave more are renewed
 
@@ -276,8 +277,10 @@ class Newton : public RowsAt {
       return Verdict::refactor;
     }
     // Lengths no longer halve. Rounding, and differences in place of C, leave that much where rows
-    // are nearly parallel; more is no convergence.
-    return length <= kLargestFloor ? Verdict::done : Verdict::failed;
+    // are nearly parallel. A longer move, or more to come at this rate, is no convergence: C may be
+    // wrong by a factor.
+    const double rest = ratio < 1.0 ? length * ratio / (1.0 - ratio) : length;
+    return std::max(length, rest) <= kStays ? Verdict::done : Verdict::failed;
   }
 
   // After a move: whether Newton's method has ended. A status other than success means that it

@@ -140,7 +140,6 @@ class RowFaults {
   // Tests C y' + g_t = 0 at the corrector's point, where y' satisfies F. C y' costs a product with
   // the present C; g is evaluated only for a row that stands out.
   std::string find_false_rows(const Corrected& at, RowsAt& rows) {
-    if (rows.age > 0) return {};
     const auto n = static_cast<std::size_t>(N_VGetLength(at.candidate.base));
     if (point_.size() != n) {  // all that a comparison needs, so that none allocates
       for (std::vector<double>* y : {&point_, &slope_, &better_, &better_p_, &moved_}) y->resize(n);
@@ -150,6 +149,7 @@ class RowFaults {
       for (OwnedVector* each : {&work_, &ycor_}) *each = OwnedVector(at.candidate.base);
       evaluator_.reserve(static_cast<int>(n));
     }
+    if (rows.age > 0) return {};
     const double* predicted = N_VGetArrayPointer(at.candidate.predicted_slope);
     const double* ycor = N_VGetArrayPointer(at.ycor);
     for (std::size_t j = 0; j < n; ++j) {
