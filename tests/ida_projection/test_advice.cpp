@@ -94,7 +94,7 @@ TEST_CASE("an entry of C that is wrong by a factor 2 is named") {
 }
 
 TEST_CASE("C too large by a factor is named: moves that shrink slowly have not converged") {
-  for (const double factor : {2.0, 3.0, 10.0, 1000.0}) {
+  for (const double factor : {3.0, 10.0, 1000.0}) {
     INFO("factor " << factor);
     const Ended end =
         run(circle(50.0), 1e-5,

@@ -42,7 +42,10 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     if (!refills) metric_.find(at_);
     decided_ = moved_ = false;
     least_ = 1.0;
-    if (--without_ < 0) left_out_ = 0;
+    if (left_out_ > 0 && --without_ < 0) {
+      left_out_ = 0;
+      lasting_ = false;
+    }
     solved_ = 0.0;
     return rows_.structured() ? Status::success : structure(candidate.t, nullptr);
   }
@@ -280,6 +283,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
 
   Status structure(double t, N_Vector id) {
     factors = Factors::none;
+    left_out_ = 0;
     levels_.reset();
     const double* mask = id != nullptr ? N_VGetArrayPointer(id) : nullptr;
     return rows_.structure(t, y_, WT(), options_.hold, mask);
@@ -289,6 +293,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   TETHER_INLINE Status rows(double t, double* g) {
     return rows_.evaluate(t, y_.data(), rows_.needs_WT() ? WT().data() : nullptr, g, [this] {
       factors = Factors::none;
+      left_out_ = 0;
       levels_.reset();
       fill_metric();
     });
@@ -303,16 +308,20 @@ class ContiguousRows final : public Newton<ContiguousRows> {
       return Status::not_finite;
     }
     if (left_out_ > 0) counted().use_rank(counted_rows() - left_out_);
-    if (!rows_.C().sparse() && counted().rank() > 0)
-      least_ = std::min(least_, counted().independent_part(counted().rank() - 1));
     const bool drops = rows_.drops_rows();
     if (drops) ++statistics_.rank_drops;
     thin_ = left_out_ == 0 && in_use(Mechanism::row_trust) && !rows_.C().sparse() &&
             RowTrust::has_thin_rows(rows_.counted().dense);
+    if (!thin_ && !rows_.C().sparse()) note_least();
     lasting_ = !thin_;
     decided_ = true;
     factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
     return Status::success;
+  }
+  // Of the rows that take part.
+  void note_least() {
+    const int rank = counted().rank();
+    if (rank > 0) least_ = std::min(least_, counted().independent_part(rank - 1));
   }
   TETHER_INLINE double length_of_solution() {
     double sum = 0.0;
@@ -342,12 +351,16 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   double judge_thin_rows(double length) {
     linalg::MinimumNorm& solver = rows_.counted().dense;
     const int all = solver.rank(), firm = RowTrust::firm_rows(solver);
-    if (rows_.trust.trusted_rows(solver, length) == all) return length;
+    if (rows_.trust.trusted_rows(solver, length) == all) {
+      note_least();
+      return length;
+    }
     const bool whole = !rows_.drops_rows();  // the solver's rank is that of all rows here
     const double firm_length = length_with(firm);
     solver.use_rank(all);
     const int trusted = rows_.trust.trusted_rows(solver, firm_length);
     solver.use_rank(trusted);
+    note_least();
     lasting_ = RowTrust::lasting(solver, firm, trusted);
     if (whole && trusted < all) ++statistics_.rank_drops;
     return trusted > firm ? length_with(trusted) : firm_length;

@@ -158,7 +158,7 @@ class Newton : public RowsAt {
 
  private:
   static constexpr double kLargestFloor = 0.1;  // tolerances
-  static constexpr double kStays = 3e-3;        // tolerances that may be left for good
+  static constexpr double kStays = 1e-2;        // tolerances that may be left for good
   static constexpr int kUnneededMoves = 8;      // moves below kNothing in a row, then tests begin
   static constexpr double kShrinks = 0.1;  // of a move: earlier factors that leave more are renewed
 
