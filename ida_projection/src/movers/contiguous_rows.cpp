@@ -318,7 +318,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     factors = drops || thin_ ? Factors::of_some_rows : Factors::of_all_rows;
     return Status::success;
   }
-  // Of the rows that take part.
+  // The least part of this candidate, of the rows that take part.
   void note_least() {
     const int rank = counted().rank();
     if (rank > 0) least_ = std::min(least_, counted().independent_part(rank - 1));
