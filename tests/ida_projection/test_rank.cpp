@@ -203,42 +203,34 @@ TEST_CASE("redundant everywhere: Kepler's four invariants have rank 3") {
   CHECK(run.steps < 1.2 * static_cast<double>(plain.steps));
 }
 
-TEST_CASE("almost parallel rows: moves of a thousandth of a tolerance that stay end no run") {
-  const double L0 = std::sqrt(1.0 - 0.09);
-  const Problem problem =
-      ode({0.7, 0.0, 0.0, std::sqrt(1.3 / 0.7)}, 20.0, [](double, const double* y, double* f) {
-        const double cube = std::pow(std::hypot(y[0], y[1]), 3);
-        for (int i = 0; i < 2; ++i) {
-          f[i] = y[2 + i];
-          f[2 + i] = -y[i] / cube;
-        }
-      });
+namespace {
+
+/// The energy E + 1/2 of Kepler's orbits, and a E + b (L - L0), L the angular momentum; without
+/// derivatives.
+tp::Constraints energy_and_momentum(double a, double b, double L0) {
   tp::Constraints rows;
   rows.count = 2;
   rows.value = [=](double, tp::ConstVector y, tp::Vector g) {
     g[0] = 0.5 * (y[2] * y[2] + y[3] * y[3]) - 1.0 / std::hypot(y[0], y[1]) + 0.5;
-    g[1] = g[0] + 1e-4 * (y[0] * y[3] - y[1] * y[2] - L0);
+    g[1] = a * g[0] + b * (y[0] * y[3] - y[1] * y[2] - L0);
   };
-  const Run run = integrate(problem, 1e-2, rows, {}, false);
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("almost parallel rows: moves of a thousandth of a tolerance that stay end no run") {
+  const double L0 = std::sqrt(1.0 - 0.09);
+  const Problem problem = kepler(0.3, 20.0);
+  const Run run = integrate(problem, 1e-2, energy_and_momentum(1.0, 1e-4, L0), {}, false);
   INFO(run.message);
   REQUIRE(run.flag >= 0);
   CHECK(run.steps < 100);  // plain IDA: 64
 }
 
 TEST_CASE("rows that touch each other: energy and angular momentum of a circular orbit") {
-  const Problem problem = ode({1.0, 0.0, 0.0, 1.0}, 20.0, [](double, const double* y, double* f) {
-    const double cube = std::pow(std::hypot(y[0], y[1]), 3);
-    for (int i = 0; i < 2; ++i) {
-      f[i] = y[2 + i];
-      f[2 + i] = -y[i] / cube;
-    }
-  });
-  tp::Constraints rows;
-  rows.count = 2;
-  rows.value = [](double, tp::ConstVector y, tp::Vector g) {
-    g[0] = 0.5 * (y[2] * y[2] + y[3] * y[3]) - 1.0 / std::hypot(y[0], y[1]) + 0.5;
-    g[1] = y[0] * y[3] - y[1] * y[2] - 1.0;
-  };
+  const Problem problem = kepler(0.0, 20.0);
+  const tp::Constraints rows = energy_and_momentum(0.0, 1.0, 1.0);
   for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
     const Run run = integrate(problem, tolerance, rows, {}, false);
     const Run plain = integrate_plain(problem, tolerance);
