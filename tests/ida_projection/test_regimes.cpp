@@ -378,3 +378,51 @@ TEST_CASE("forms of index 2 close to rounding: multipliers in Newton's test fail
   CHECK(run.error <= 1e-10);
   CHECK(run.steps <= 10000);
 }
+
+// x' = u, u' = f(lambda) + f0 - x - u |u| / 2, u = cos 4t. A wrong lambda leaves u as it is, so
+// that Newton's test of lambda alone finds it; f(lambda) = log lambda, and 10 tanh lambda from 0.
+TEST_CASE("forms of index 2: F that is not affine in a multiplier") {
+  constexpr double kRate = 4.0;
+  struct Law {
+    double (*f)(double);
+    double (*inverse)(double);
+    double f0;
+  };
+  const Law laws[] = {
+      {[](double x) { return std::log(x); }, [](double f) { return std::exp(f); }, 0.0},
+      {[](double x) { return 10.0 * std::tanh(x); }, [](double f) { return std::atanh(f / 10.0); },
+       0.5}};
+  for (const Law& law : laws) {
+    const auto multiplier = [&](double t) {
+      const double s = std::sin(kRate * t), c = std::cos(kRate * t);
+      return law.inverse(s / kRate - kRate * s + 0.5 * c * std::abs(c) - law.f0);
+    };
+    Problem p;
+    p.index = 2;
+    p.size = 3;
+    p.t_end = 10.0;
+    p.id = {1, 1, 0};
+    p.y0 = {0.0, 1.0, multiplier(0.0)};
+    p.yp0 = {1.0, 0.0, 0.0};
+    p.residual = [&law](double t, const double* y, const double* yp, double* r) {
+      r[0] = yp[0] - y[1];
+      r[1] = yp[1] - law.f(y[2]) - law.f0 + y[0] + 0.5 * y[1] * std::abs(y[1]);
+      r[2] = y[1] - std::cos(kRate * t);
+    };
+    tp::Constraints rows;
+    rows.count = 2;
+    rows.value = [](double t, tp::ConstVector y, tp::Vector g) {
+      g[0] = y[0] - std::sin(kRate * t) / kRate;
+      g[1] = y[1] - std::cos(kRate * t);
+    };
+    for (const double tolerance : {1e-4, 1e-5, 1e-6}) {
+      INFO("f0 " << law.f0 << ", tolerance " << tolerance);
+      Host host(p, tolerance);
+      host.attach(rows);
+      REQUIRE(host.finish() >= 0);
+      const double right = multiplier(p.t_end);
+      CHECK(std::abs(host.data()[2] - right) <= 100.0 * tolerance * (1.0 + std::abs(right)));
+      CHECK(host.steps() <= 1000);
+    }
+  }
+}
