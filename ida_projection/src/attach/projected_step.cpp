@@ -267,7 +267,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   leave_out_of_error_test(true);
   if (variables_.high_index())
     control_.begin_smoothing(
-        setpoint_of_high_index(candidate, variables_, constraints_.total_count()));
+        stricter_in_index_2(candidate, variables_, constraints_.total_count()));
   observer_.check_form(candidate);
   if (in_use(Mechanism::joined_equations)) rows_.joined.join(candidate);
   rows_.used = rows_.joined.rows() != nullptr ? rows_.joined.rows() : rows_.own.get();

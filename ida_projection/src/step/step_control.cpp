@@ -21,7 +21,7 @@ void StepControl::reset() {
     settings_.set({});
   }
   smoother_.end();
-  if (options_.step_smoothing) smoother_.begin({});
+  if (options_.step_smoothing) smoother_.begin(1.0);
   algebraic_test_.begin({});
   refused_ = 0;
   last_error_failures_ = corrector_failures_ = 0;
@@ -73,11 +73,11 @@ bool StepControl::in_trouble(const Attempt& attempt) const {
          (corrector_failures_ > 0 || (failures > 1 && kOftenRefused * failures > attempt.steps));
 }
 
-void StepControl::begin_smoothing(const SetpointFactors& factors) {
+void StepControl::begin_smoothing(double stricter) {
   if (smoother_.on() || !options_.advanced.smooth_where_needed) return;
   order_limit_.end();
   settings_.forget();
-  smoother_.begin(factors);
+  smoother_.begin(stricter);
   ++statistics_.smoothing_begun;
 }
 

@@ -65,7 +65,7 @@ class StepControl {
     const bool failed = last_error_failures_ < attempt.error_test_failures;
     last_error_failures_ = attempt.error_test_failures;
     refused_ = failed ? refused_ + kOftenRefused - 1 : std::max(0, refused_ - 1);
-    if (engaged && refused_ >= kTrapped) begin_smoothing({});
+    if (engaged && refused_ >= kTrapped) begin_smoothing(1.0);
   }
   /// The corrector failed in a way that a smaller step may cure.
   void corrector_failed();
@@ -80,7 +80,7 @@ class StepControl {
   double weights_factor() const { return weights_factor_; }
   bool smoothing() const { return smoother_.on(); }
   /// Begins smoothing, unless Advanced::smooth_where_needed is off.
-  void begin_smoothing(const SetpointFactors& factors);
+  void begin_smoothing(double stricter);
 
   /// In the first step: whether algebraic variables fail the test at every step size.
   bool starts_off_equations(const Attempt& attempt) const;

@@ -20,34 +20,29 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kFilter = 4.0;     // b
-constexpr double kSetpoint = 4.0;   // sigma: errors are steered to 1 / sigma of what IDA allows
-constexpr double kFar = 0.5;        // of the setpoint
-constexpr double kOfOrder = 1.348;  // setpoints of neighbouring orders: 6^(1/6)
+constexpr double kFilter = 4.0;    // b
+constexpr double kSetpoint = 4.0;  // sigma: errors are steered to 1 / sigma of what IDA allows
+constexpr double kFar = 0.5;       // of the setpoint
 constexpr StepBounds kHold{1.0, kAnyRatio};  // keep h, or reduce it by IDA's own rule
 
-// For setpoint_of_high_index(): errors of multipliers enter those of the others aside from the
-// test, which halves at low orders; the factor that makes end errors follow the tolerance; and
-// directions that rows leave free.
-constexpr double kAsideFromTest = 1.5, kAtLowOrders = 0.9, kProportional = 1e-4, kManyFree = 0.4;
+// Factors of the setpoint in index 2: errors of multipliers, which leave the test, enter those of
+// the others. End errors follow the tolerance where unknowns are more than 1 / kProportional
+// tolerances and rows leave this part of the directions free.
+constexpr double kAsideFromTest = 1.5, kProportional = 3e-4, kManyFree = 0.4;
 
 }  // namespace
 
-// The factor s by which errors are kept below the tolerance. End errors follow
-// (tolerance / s)^(k/(k+1)) at order k, so that s in proportion to tolerance^(-1/k), with k = 5,
-// makes them follow the tolerance. Where rows leave few directions free the projection removes most
-// of the error, and s keeps its usual value. Runs at loose tolerances are short and of low order,
-// where s is halved.
-SetpointFactors setpoint_of_high_index(const Candidate& candidate,
-                                       const AlgebraicVariables& variables, int rows) {
+// End errors follow (tolerance / s)^(k/(k+1)) at order k, so that s in proportion to
+// tolerance^(-1/k), with k = 5, makes them follow the tolerance. Where rows leave few directions
+// free the projection removes most of the error.
+double stricter_in_index_2(const Candidate& candidate, const AlgebraicVariables& variables,
+                           int rows) {
   const N_Vector id = variables.id();
-  const SetpointFactors usual{kAsideFromTest, kAsideFromTest};
   if (!in_use(Mechanism::stricter_setpoint) || variables.undetermined().empty() ||
       rows > (1.0 - kManyFree) * N_VDotProd(id, id))
-    return usual;
+    return kAsideFromTest;
   const double unknowns = N_VWrmsNormMask(candidate.base, candidate.weights, id);  // in tolerances
-  const double tighter = std::max(1.0, std::pow(kProportional * unknowns, 0.2));
-  return {kAsideFromTest * tighter, kAtLowOrders * tighter * tighter};
+  return std::max(1.0, std::pow(kProportional * unknowns, 0.2));
 }
 
 // sigma_k = prod_i i h / (h + h_{-1} + .. + h_{-i}), i = 1 .. k (Brenan, Campbell and Petzold,
@@ -72,17 +67,6 @@ double StepSmoother::test_constant(double h, int order) const {
     alpha_s -= 1.0 / (i + 1);
   }
   return std::max(std::abs(newest + alpha_s - alpha_0), newest);
-}
-
-// A setpoint s makes steps shorter by s^(1/(k+1)). It depends on the order so that steps of all
-// orders become shorter by the same factor.
-double StepSmoother::setpoint(int order) {
-  if (now_->setpoint_order == order) return now_->setpoint;
-  const double graded =
-      now_->factors.most * std::pow(kOfOrder, order - options_.advanced.maximum_order);
-  now_->setpoint_order = order;
-  return now_->setpoint =
-             kSetpoint * std::max(graded, std::min(now_->factors.least, now_->factors.most));
 }
 
 double StepSmoother::filter(double log_c, int order) const {
@@ -128,7 +112,7 @@ Control StepSmoother::control(const Attempt& attempt, double norm) {
   const int order = attempt.order;
   if (s.h > 0.0) note_previous(attempt.accepted, h, order);
   const double error = error_constant(h, order) * norm;
-  const double log_c = -std::log(setpoint(order) * error + 1e-4);
+  const double log_c = -std::log(kSetpoint * s.stricter * error + 1e-4);
   s.h = h;
   s.order = order;
   s.log_c = log_c;

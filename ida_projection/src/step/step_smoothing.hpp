@@ -12,14 +12,9 @@
 
 namespace tether::ida_projection {
 
-/// Factors of the setpoint s: at the largest order, and its least value at lower orders, see
-/// StepSmoother::setpoint().
-struct SetpointFactors {
-  double most = 1.0, least = 1.0;
-};
-/// Those of forms of index 2, with this number of rows (method, section 7).
-SetpointFactors setpoint_of_high_index(const Candidate& candidate,
-                                       const AlgebraicVariables& variables, int rows);
+/// The factor of the setpoint s in forms of index 2, with this number of rows (method, section 7).
+double stricter_in_index_2(const Candidate& candidate, const AlgebraicVariables& variables,
+                           int rows);
 
 /// Soederlind's filter H211b (ACM TOMS 29 (2003) 1-26), p = k + 1, k the order:
 ///
@@ -38,8 +33,8 @@ class StepSmoother {
  public:
   explicit StepSmoother(const Options& options) : options_(options) {}
 
-  /// From this attempt on; see SetpointFactors.
-  void begin(const SetpointFactors& factors) { now_.emplace().factors = factors; }
+  /// From this attempt on. `stricter`: the factor of s.
+  void begin(double stricter) { now_.emplace().stricter = stricter; }
   void end() { now_.reset(); }
   bool on() const { return now_.has_value(); }
   /// The corrector failed at this step size.
@@ -56,9 +51,7 @@ class StepSmoother {
 
   // From the beginning on.
   struct State {
-    SetpointFactors factors;
-    int setpoint_order = 0;
-    double setpoint = 0.0;        // at this order
+    double stricter = 1.0;        // factor of the setpoint
     double h = 0.0, log_c = 0.0;  // of the attempt that IDA judges; 0: there was none
     int order = 0;
     std::array<double, kMaximumOrder> past{};  // accepted sizes, the latest first
@@ -79,7 +72,6 @@ class StepSmoother {
   };
 
   void note_previous(bool accepted, double h, int order);
-  double setpoint(int order);
   double error_constant(double h, int order) const;
   double test_constant(double h, int order) const;
   double filter(double log_c, int order) const;
