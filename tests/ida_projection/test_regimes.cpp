@@ -380,7 +380,8 @@ TEST_CASE("forms of index 2 close to rounding: multipliers in Newton's test fail
 }
 
 // x' = u, u' = f(lambda) + f0 - x - u |u| / 2, u = cos 4t. A wrong lambda leaves u as it is, so
-// that Newton's test of lambda alone finds it; f(lambda) = log lambda, and 10 tanh lambda from 0.
+// that Newton's test of lambda alone finds it; f(lambda) = log lambda, 10 tanh lambda from 0, and
+// asinh lambda from 0, which failed corrections must not take out of the test.
 TEST_CASE("forms of index 2: F that is not affine in a multiplier") {
   constexpr double kRate = 4.0;
   struct Law {
@@ -391,7 +392,8 @@ TEST_CASE("forms of index 2: F that is not affine in a multiplier") {
   const Law laws[] = {
       {[](double x) { return std::log(x); }, [](double f) { return std::exp(f); }, 0.0},
       {[](double x) { return 10.0 * std::tanh(x); }, [](double f) { return std::atanh(f / 10.0); },
-       0.5}};
+       0.5},
+      {[](double x) { return std::asinh(x); }, [](double f) { return std::sinh(f); }, 0.5}};
   for (const Law& law : laws) {
     const auto multiplier = [&](double t) {
       const double s = std::sin(kRate * t), c = std::cos(kRate * t);
@@ -416,7 +418,7 @@ TEST_CASE("forms of index 2: F that is not affine in a multiplier") {
       g[1] = y[1] - std::cos(kRate * t);
     };
     for (const double tolerance : {1e-4, 1e-5, 1e-6}) {
-      INFO("f0 " << law.f0 << ", tolerance " << tolerance);
+      INFO("law " << &law - laws << ", tolerance " << tolerance);
       Host host(p, tolerance);
       host.attach(rows);
       REQUIRE(host.finish() >= 0);

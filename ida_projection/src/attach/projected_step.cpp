@@ -215,6 +215,8 @@ bool Projection::Impl::in_trouble(const Attempt& attempt, const Candidate& candi
 
 int Projection::Impl::corrector_failed(const Candidate& candidate, int flag) {
   if (flag > 0) control_.corrector_failed();
+  if (flag > 0 && corrector_.multipliers().acts() && corrector_.fails_anyway())
+    corrector_.multipliers().allow(polish_.response_to_rounding(candidate));
   polish_.corrector_failed();
   observer_.corrector_failed(candidate, flag);
   return flag;
@@ -282,7 +284,7 @@ Status Projection::Impl::engage(const Candidate& candidate) {
   if (!options_.suppress_algebraic) return structured;
   if (in_use(Mechanism::followers) && !variables_.high_index())
     corrector_.wait(variables_.any() ? Corrector::Wait::always : Corrector::Wait::after_failures);
-  if (in_use(Mechanism::free_multipliers)) corrector_.leave_out(variables_.undetermined());
+  if (in_use(Mechanism::multipliers_apart)) corrector_.judge_apart(variables_.undetermined());
   return structured;
 }
 

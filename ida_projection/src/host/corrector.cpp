@@ -20,23 +20,18 @@ bool Corrector::is_reached_by(const Ida& ida) {
 
 int Corrector::initialize() {
   iterations_ = failures_in_row_ = 0;
-  rounding_fails_ = false;
-  rounding_.clear();
+  multipliers_.set({});
   wait(Wait::never);
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
-// Without those that rounding fails.
-N_Vector Corrector::reduced(N_Vector weights) {
-  if (!weights_) weights_ = OwnedVector(weights);
-  N_VScale(1.0, weights, weights_);
-  double* entries = N_VGetArrayPointer(weights_);
-  for (const int j : rounding_) entries[j] = 0.0;
-  return weights_;
-}
-
 void Corrector::wait(Wait when) {
   if (std::exchange(wait_, when) != when) install_convergence_test();
+}
+
+void Corrector::judge_apart(const std::vector<int>& multipliers) {
+  multipliers_.set(multipliers);
+  install_convergence_test();
 }
 
 int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
@@ -47,8 +42,9 @@ int Corrector::set_convergence_test(SUNNonlinSolConvTestFn f, void* data) {
 
 // Installs IDA's own test if nothing has to be added to it.
 int Corrector::install_convergence_test() {
-  return wait_ != Wait::never ? SUNNonlinSolSetConvTestFn(inner_, test_convergence, this)
-                              : SUNNonlinSolSetConvTestFn(inner_, test_, test_data_);
+  const bool adds = wait_ != Wait::never || multipliers_.acts();
+  return adds ? SUNNonlinSolSetConvTestFn(inner_, test_convergence, this)
+              : SUNNonlinSolSetConvTestFn(inner_, test_, test_data_);
 }
 
 // IDA takes an iteration for divergent if a change is longer than 0.9 of the one before. What
@@ -57,13 +53,18 @@ int Corrector::install_convergence_test() {
 // converges: it goes on to the third.
 int Corrector::test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                                 sunrealtype tolerance, N_Vector weights, void* self) {
-  const Corrector& ours = *static_cast<Corrector*>(self);
-  const int flag = ours.test_(solver, ycor, change, tolerance, weights, ours.test_data_);
-  int changes_before = 0;
-  const bool waits = ours.wait_ == Wait::always || ours.failures_in_row_ >= kFailsAnyway;
-  const bool second = waits && flag == SUN_NLS_CONV_RECVR &&
-                      SUNNonlinSolGetCurIter(solver, &changes_before) == 0 && changes_before == 1;
-  return second ? SUN_NLS_CONTINUE : flag;
+  Corrector& ours = *static_cast<Corrector*>(self);
+  const auto flag_of_ida = [&] {
+    return ours.test_(solver, ycor, change, tolerance, weights, ours.test_data_);
+  };
+  int before = 0;
+  SUNNonlinSolGetCurIter(solver, &before);
+  if (ours.multipliers_.acts())
+    return ours.multipliers_.judge(before, ours.maximum_iterations_, change, weights, tolerance,
+                                   flag_of_ida);
+  const int flag = flag_of_ida();
+  const bool waits = ours.wait_ == Wait::always || ours.fails_anyway();
+  return waits && flag == SUN_NLS_CONV_RECVR && before == 1 ? SUN_NLS_CONTINUE : flag;
 }
 
 int Corrector::residual(N_Vector ycor, N_Vector into) {

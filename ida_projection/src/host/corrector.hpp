@@ -10,6 +10,7 @@
 
 #include "host/candidate.hpp"
 #include "host/ida.hpp"
+#include "host/multiplier_test.hpp"
 #include "host/owned_vector.hpp"
 
 namespace tether::ida_projection {
@@ -40,19 +41,19 @@ class Corrector {
   }
   /// Computes the correction of the candidate.
   int correct(const Candidate& candidate, double tolerance, bool call_setup) {
-    const bool whole = !rounding_fails_ || rounding_.empty();
+    multipliers_.begin(candidate.h, has_setup_ ? candidate.cj : 0.0, call_setup);
     const int flag = SUNNonlinSolSolve(inner_, candidate.base, candidate.correction,
-                                       whole ? candidate.weights : reduced(candidate.weights),
-                                       tolerance, call_setup, mem_);
+                                       candidate.weights, tolerance, call_setup, mem_);
     SUNNonlinSolGetNumIters(inner_, &iterations_);
     failures_in_row_ = flag == 0 ? 0 : failures_in_row_ + 1;
-    if (failures_in_row_ >= kFailsAnyway) rounding_fails_ = true;
     return flag;
   }
-  /// If corrections fail although IDA has already cut the step for that, the convergence test from
-  /// then on leaves out these algebraic variables of index 2 or more, in this run. Their rounding,
-  /// divided by the step, fails the test, and no other variable depends on them.
-  void leave_out(const std::vector<int>& rounding) { rounding_ = rounding; }
+  /// Whether corrections fail although IDA has cut the step for that.
+  bool fails_anyway() const { return failures_in_row_ >= kFailsAnyway; }
+  /// These multipliers are judged apart from IDA's convergence test in this run.
+  void judge_apart(const std::vector<int>& multipliers);
+  MultiplierTest& multipliers() { return multipliers_; }
+  const MultiplierTest& multipliers() const { return multipliers_; }
   /// When IDA's test does not fail at the second change: where algebraic variables follow others,
   /// or where corrections fail although IDA has cut the step.
   enum class Wait { never, after_failures, always };
@@ -108,16 +109,13 @@ class Corrector {
   static int test_convergence(SUNNonlinearSolver solver, N_Vector ycor, N_Vector change,
                               sunrealtype tolerance, N_Vector weights, void* self);
   int install_convergence_test();
-  N_Vector reduced(N_Vector weights);
 
   SUNNonlinSolConvTestFn test_ = nullptr;  // IDA's
   void* test_data_ = nullptr;
   Wait wait_ = Wait::never;
   long iterations_ = 0;
   int failures_in_row_ = 0;
-  bool rounding_fails_ = false;
-  std::vector<int> rounding_;
-  OwnedVector weights_;  // without those that rounding fails
+  MultiplierTest multipliers_;
 };
 
 }  // namespace tether::ida_projection

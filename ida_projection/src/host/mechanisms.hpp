@@ -18,7 +18,7 @@ enum class Mechanism {
   polish_first,           ///< the polish precedes the move
   forecast_polish,        ///< the polish is forecast without an evaluation of F
   followers,              ///< IDA's test waits for algebraic variables that follow
-  free_multipliers,       ///< IDA's convergence test leaves out multipliers of index 2
+  multipliers_apart,      ///< Newton's test judges multipliers of index 2 by a rate of their own
   widened_tolerance,      ///< for algebraic variables that respond to moves
   index_in_trouble,       ///< the index of F is found when error tests fail
   stricter_setpoint,      ///< smaller errors in index 2, by tolerance and order
@@ -37,7 +37,7 @@ enum class Mechanism {
 
 inline constexpr const char* kMechanismNames[] = {
     "repeated correction", "polish first",      "forecast polish",  "followers",
-    "free multipliers",    "widened tolerance", "index in trouble", "stricter setpoint",
+    "multipliers apart",   "widened tolerance", "index in trouble", "stricter setpoint",
     "tested long moves",   "row trust",         "rows left out",    "kept rank",
     "tests before moves",  "rate limit",        "other metric",     "expected oscillations",
     "joined equations",    "false-row watch"};

@@ -2,6 +2,8 @@
 // BSD-3-Clause
 #pragma once
 
+#include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace tether::ida_projection {
@@ -22,5 +24,10 @@ constexpr double kQuotientRounding = 1e-6, kProductRounding = 10.0 * kQuotientRo
 /// quantities that change slowly are measured anew in one of kMeasureEvery.
 constexpr int kOneIn = 16;
 constexpr long kMeasureEvery = 64;
+
+/// Between 1 and 2, varies irregularly with j: changes of y in these proportions do not cancel.
+inline double irregular(std::size_t j, double turn = 2.3) {
+  return 1.5 + 0.5 * std::sin(1.0 + turn * static_cast<double>(j));
+}
 
 }  // namespace tether::ida_projection

@@ -10,6 +10,7 @@
 
 #include "host/corrector.hpp"
 #include "host/owned_vector.hpp"
+#include "host/rounding.hpp"
 
 namespace tether::ida_projection {
 
@@ -63,9 +64,8 @@ class NearbyResiduals {
     std::vector<double> change(static_cast<std::size_t>(N_VGetLength(candidate.base)));
     for (std::size_t j = 0; j < change.size(); ++j) {
       const double w = candidate.weight_entries[j];
-      const double irregular = 1.5 + 0.5 * std::sin(1.0 + turn * static_cast<double>(j));
-      change[j] =
-          size * irregular * std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(candidate.cj));
+      change[j] = size * irregular(j, turn) *
+                  std::max(w > 0.0 ? 1.0 / w : 1.0, 1e-3 / std::abs(candidate.cj));
     }
     return change;
   }

@@ -20,6 +20,7 @@
 #include <limits>
 
 #include "host/mechanisms.hpp"
+#include "host/rounding.hpp"
 
 namespace tether::ida_projection {
 
@@ -83,6 +84,23 @@ double Polish::response_length(const Candidate& candidate) {
   N_VLinearSum(1.0, delta_, -1.0, noise_, work_);
   const double length = differential_length(candidate, work_);
   return std::isfinite(length) ? length : -1.0;
+}
+
+double Polish::response_to_rounding(const Candidate& candidate) {
+  if (!corrector_.solves()) return 0.0;
+  const double* const y = candidate.base_entries;
+  double* const rounding = N_VGetArrayPointer(work_);
+  for (sunindextype j = 0; j < N_VGetLength(work_); ++j)
+    rounding[j] = kEpsilon * irregular(static_cast<std::size_t>(j)) * std::abs(y[j]);
+  const auto same_y = [&](std::size_t j) { return y[j] - rounding[j]; };
+  statistics_.residual_evaluations += 2;
+  if (corrector_.residual_with(candidate, same_y, work_, delta_) != 0) return 0.0;
+  N_VConst(0.0, work_);
+  if (corrector_.residual(work_, noise_) != 0) return 0.0;
+  N_VLinearSum(1.0, delta_, -1.0, noise_, delta_);
+  if (!corrector_.solve_linear(delta_)) return 0.0;
+  const double length = corrector_.multipliers().length(delta_, candidate.weights);
+  return std::isfinite(length) ? length : 0.0;
 }
 
 const double* Polish::response(const Candidate& candidate, N_Vector residual) {

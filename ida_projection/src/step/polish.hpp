@@ -132,6 +132,9 @@ class Polish {
   }
   /// Whether response(), of contiguous vectors, can be computed.
   bool is_response_available() const { return corrector_.solves() && !iterative_; }
+  /// Length in tolerances by which the multipliers respond to rounding of y', which is that of y
+  /// divided by the step; 0: F or the linear solver fails.
+  double response_to_rounding(const Candidate& candidate);
   /// After a move: length of the response -J^-1 F_y dy over the differential variables, in
   /// tolerances; -1: F or the linear solver fails.
   double response_length(const Candidate& candidate);
