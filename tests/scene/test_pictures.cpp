@@ -177,6 +177,7 @@ TEST_CASE("texts of the pictures of all shipped scenes are apart") {
     scene.end *= 0.003;
     scene.expect.clear();
     scene.output = Output{};
+    scene.output.every = scene.end / 100;
     scene.output["svg"] = (folder("pictures") / "a.svg").string();
     run(scene);
     const std::vector<Text> texts = texts_of(content(scene.output["svg"]));

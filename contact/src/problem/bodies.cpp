@@ -2,11 +2,13 @@
 // BSD-3-Clause
 #include <tether/contact/bodies.hpp>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <tether/linalg/index.hpp>
+#include <tether/linalg/symmetric_eigen.hpp>
 
 #include "problem/body_form.hpp"
 #include "problem/refuse.hpp"
@@ -31,6 +33,14 @@ Vector6d RigidBody::velocities() const {
 void RigidBody::set_velocities(const Vector6d& v) {
   velocity = v.head<3>();
   angular_velocity = v.tail<3>();
+}
+
+Matrix6d detail::inverse_mass_root(const Matrix6d& inverse_mass) {
+  using Plain = Eigen::Matrix<double, 6, 6>;
+  const Eigen::LLT<Plain> cholesky((Plain(inverse_mass)));
+  if (cholesky.info() == Eigen::Success) return Plain(cholesky.matrixL());
+  const linalg::SymmetricEigen<6> eigen = linalg::symmetric_eigen(inverse_mass);
+  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 void detail::check(const std::vector<RigidBody>& bodies, const std::vector<ContactRows>& contacts) {

@@ -1,26 +1,18 @@
 // Tether: factors of a Delassus matrix by bodies. SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <map>
 #include <memory>
 #include <tether/contact/bodies.hpp>
 #include <tether/contact/problem.hpp>
 #include <tether/linalg/block3.hpp>
 #include <tether/linalg/index.hpp>
-#include <tether/linalg/symmetric_eigen.hpp>
 #include <vector>
 
 namespace tether::contact::detail {
 
 /// C with C C' = inverse mass.
-inline Matrix6d inverse_mass_root(const Matrix6d& inverse_mass) {
-  using Plain = Eigen::Matrix<double, 6, 6>;
-  const Eigen::LLT<Plain> cholesky((Plain(inverse_mass)));
-  if (cholesky.info() == Eigen::Success) return Plain(cholesky.matrixL());
-  const linalg::SymmetricEigen<6> eigen = linalg::symmetric_eigen(inverse_mass);
-  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
-}
+Matrix6d inverse_mass_root(const Matrix6d& inverse_mass);
 
 /// The block as one of Eigen's.
 inline auto as_matrix(linalg::PackedBlock& block) {

@@ -3,7 +3,7 @@
 #include "instant_scribe.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
+#include <tether/linalg/least_squares.hpp>
 
 #include "natural_map.hpp"
 
@@ -120,7 +120,9 @@ void InstantScribe::put_reactions(double time, const Eigen::VectorXd& momenta, s
       G.block<3, 1>(6 * slot, static_cast<int>(k)) += units[k].on[side].force;
       G.block<3, 1>(6 * slot + 3, static_cast<int>(k)) += units[k].on[side].torque;
     }
-  const Eigen::VectorXd x = G.completeOrthogonalDecomposition().solve(momenta);
+  linalg::LeastSquares factors;
+  factors.factor(G);
+  const Eigen::VectorXd x = factors.solve(momenta);
   for (std::size_t k = 0; k < units.size(); ++k)
     Line(out, "pull") << units[k].number << x[static_cast<int>(k)];
 }

@@ -1,7 +1,7 @@
 // Tether: the rows of joints as a certificate tells them. SPDX-License-Identifier: BSD-3-Clause
 #include "joint_lines.hpp"
 
-#include <Eigen/QR>
+#include <tether/linalg/least_squares.hpp>
 
 #include "joints/joint_type.hpp"
 #include "sheet.hpp"
@@ -122,13 +122,15 @@ void JointLines::put_pulls(const mechanics::Bodies& bodies, double time,
   for (const Unit& unit : units(bodies, time)) of[at(unit.joint)].push_back(unit);
   for (std::size_t j = 0; j < forces.size(); ++j) {
     if (of[j].empty()) continue;
-    Eigen::Matrix<double, 6, Eigen::Dynamic> G(6, of[j].size());
+    Eigen::MatrixXd G(6, of[j].size());
     for (std::size_t k = 0; k < of[j].size(); ++k)
       G.col(static_cast<int>(k)) << of[j][k].on[0].force, of[j][k].on[0].torque;
     const JointForce& f = forces[j];
     Eigen::Matrix<double, 6, 1> load;
     load << f.force, f.moment + (f.at - bodies.frames[at(of[j][0].body[0])].x).cross(f.force);
-    const Eigen::VectorXd x = G.completeOrthogonalDecomposition().solve(load);
+    linalg::LeastSquares factors;
+    factors.factor(G);
+    const Eigen::VectorXd x = factors.solve(load);
     for (std::size_t k = 0; k < of[j].size(); ++k)
       if (x[static_cast<int>(k)] != 0)
         Line(out, "pull") << of[j][k].number << x[static_cast<int>(k)];
