@@ -113,3 +113,23 @@ TEST_CASE("event: what joints drive into a wall is named") {
                     Catch::Contains("t = 0.75") &&
                         Catch::Contains("no impulses keep \"piston\" and \"wall\" apart: joints"));
 }
+
+TEST_CASE("event: a box slides from one plate onto another whose top is in the same plane") {
+  const auto plate = [](const std::string& name, double x) {
+    return "[[body]]\nname = \"" + name + "\"\nshape = \"box\"\nsize = [1, 1, 0.2]\nposition = [" +
+           number(x) + ", 0, -0.1]\nfixed = true\nmaterial = \"floor\"\n";
+  };
+  const std::string text =
+      plate("first", 0) + plate("second", 1) +
+      "[[body]]\nname = \"box\"\nshape = \"box\"\nsize = [0.2, 0.2, 0.1]\nmass = 1\n"
+      "position = [0.2, 0.05, 0.05]\nvelocity = [1.818, 0, 0]\nmaterial = \"body\"\n" +
+      pair("friction = 0.2\nrestitution = 0.4");
+  for (const double tolerance : {1e-5, 1e-7}) {
+    CAPTURE(tolerance);
+    const auto engine = run(text, tolerance, 0.8);
+    const BodyState& box = engine->bodies()[2];
+    CHECK(of_kind(*engine, Kind::impact).empty());
+    CHECK(std::abs(box.velocity.x() - (1.818 - 0.2 * 9.81 * 0.8)) < 10 * tolerance);
+    CHECK(std::abs(box.position.x() - (0.2 + 1.818 * 0.8 - 0.1 * 9.81 * 0.64)) < 10 * tolerance);
+  }
+}

@@ -121,6 +121,23 @@ TEST_CASE("event: ellipsoids of equal axes touch as spheres do") {
   }
 }
 
+TEST_CASE("event: discs that nearly touch have their gap, not that of another local maximum") {
+  event::RoundOnRound pair;
+  pair.first.shape.diagonal().head<2>().setConstant(0.57244141094380863);
+  pair.second.shape.diagonal().head<2>().setConstant(3.8760826052101529);
+  mechanics::Frame<double> A{}, B{};
+  for (mechanics::Frame<double>* f : {&A, &B})
+    for (Vector3d* v : {&f->x, &f->v, &f->a, &f->W, &f->alpha}) v->setZero();
+  A.R = Eigen::Quaterniond(0.86396770493887998, -0.064217334086719188, 0.46299535657540358,
+                           0.18727316576342162)
+            .toRotationMatrix();
+  B.R = Eigen::Quaterniond(0.63011381465922478, -0.30824920609155698, 0.67386406888064987,
+                           0.23204789202046161)
+            .toRotationMatrix();
+  A.x = Vector3d(0.62036644694359167, -0.6745669080757295, 3.8956402296829782);
+  CHECK(std::abs(pair.touch(A, B).gap - 0.00435348675) < 1e-10);
+}
+
 TEST_CASE("event: the second derivative of round contacts is that of their gap") {
   using namespace tether::scene::event;
   Frame<double> A, B;
