@@ -2,6 +2,7 @@
 // BSD-3-Clause
 #include <cmath>
 #include <problems/car_axis.hpp>
+#include <problems/governor.hpp>
 #include <problems/nand_gate.hpp>
 #include <problems/pendulum.hpp>
 #include <problems/rows.hpp>
@@ -426,5 +427,16 @@ TEST_CASE("forms of index 2: F that is not affine in a multiplier") {
       CHECK(std::abs(host.data()[2] - right) <= 100.0 * tolerance * (1.0 + std::abs(right)));
       CHECK(host.steps() <= 1000);
     }
+  }
+}
+
+TEST_CASE("forms of index 2: rounding of multipliers in the first steps passes Newton's test") {
+  const Problem problem = governor(1.0, "index 2 w");
+  for (const double tolerance : {1e-7, 1e-8}) {
+    INFO("tolerance " << tolerance);
+    const Run run = integrate(problem, tolerance, problem.recommended_constraints(), {}, false);
+    REQUIRE(run.flag >= 0);
+    CHECK(run.error <= 100.0 * tolerance);
+    CHECK(run.steps <= 1500);
   }
 }
