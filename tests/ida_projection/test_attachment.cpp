@@ -116,6 +116,30 @@ TEST_CASE("a nonlinear solver handed over is decorated, and stays the caller's")
   SUNNonlinSolFree(newton);  // ours to free: nobody else did
 }
 
+TEST_CASE("IDAReInit: Newton's convergence test is IDA's own again, until moves begin") {
+  static SUNNonlinSolConvTestFn in_use = nullptr;
+  const Problem problem = pendulum(1.0, 1.0, 5.0, "index 2");
+  Host host(problem, 1e-6);
+  SUNNonlinearSolver newton = SUNNonlinSol_Newton(host.y, host.context);
+  static const auto set = newton->ops->setctestfn;
+  newton->ops->setctestfn = [](SUNNonlinearSolver solver, SUNNonlinSolConvTestFn f, void* data) {
+    in_use = f;
+    return set(solver, f, data);
+  };
+  tp::Options options;
+  options.nonlinear_solver = newton;
+  host.attach(problem.recommended_constraints(), options);
+  const SUNNonlinSolConvTestFn of_ida = in_use;
+  REQUIRE(of_ida != nullptr);
+  REQUIRE(host.finish() >= 0);
+  CHECK(in_use != of_ida);  // it judges multipliers apart
+  REQUIRE(host.restart() == 0);
+  IDASetStopTime(host.ida, 1e-12);
+  REQUIRE(host.step() >= 0);
+  CHECK(in_use == of_ida);
+  SUNNonlinSolFree(newton);
+}
+
 TEST_CASE("a fixed-point solver is refused") {
   Host host(swing(), 1e-6);
   SUNNonlinearSolver fixed = SUNNonlinSol_FixedPoint(host.y, 0, host.context);

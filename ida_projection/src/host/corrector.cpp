@@ -20,8 +20,8 @@ bool Corrector::is_reached_by(const Ida& ida) {
 
 int Corrector::initialize() {
   iterations_ = failures_in_row_ = 0;
-  multipliers_.set({});
-  wait(Wait::never);
+  wait_ = Wait::never;
+  judge_apart({});
   return inner_->ops->initialize != nullptr ? SUNNonlinSolInitialize(inner_) : 0;
 }
 
