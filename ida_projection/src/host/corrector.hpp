@@ -53,7 +53,6 @@ class Corrector {
   /// These multipliers are judged apart from IDA's convergence test in this run.
   void judge_apart(const std::vector<int>& multipliers);
   MultiplierTest& multipliers() { return multipliers_; }
-  const MultiplierTest& multipliers() const { return multipliers_; }
   /// When IDA's test does not fail at the second change: where algebraic variables follow others,
   /// or where corrections fail although IDA has cut the step.
   enum class Wait { never, after_failures, always };
