@@ -269,11 +269,25 @@ static std::vector<char> repeat_equations(Evaluator& rows, const Residual& resid
 }
 
 // Those of the rows `which` that constrain the differential variables in a direction that is not in
-// `plain`, and for each equation whether such a row needs it, or will need it where entries grow.
-static std::pair<std::vector<int>, std::vector<char>> rows_in_new_directions(
-    const std::vector<int>& which, const Span& plain, const std::vector<int>& algebraic,
-    const Point& away, const Point& here) {
+// `plain`.
+static std::vector<int> rows_in_new_directions(const std::vector<int>& which, const Span& plain,
+                                               const std::vector<int>& algebraic,
+                                               const Point& here) {
   std::vector<int> rows;
+  Eigen::VectorXd x;
+  for (int i : which) {
+    if (!here.explain(here.C, i, algebraic, &x)) continue;
+    Eigen::VectorXd reduced = here.C.row(i).transpose() - here.h.transpose() * x;
+    for (int j : algebraic) reduced[j] = 0.0;
+    if (plain.rest(reduced).norm() > kRestricts * (1.0 + x.norm())) rows.push_back(i);
+  }
+  return rows;
+}
+
+// For each equation whether one of these rows needs it, or will need it where entries grow. Keeps
+// the rows that the equations explain at both points.
+static std::vector<char> equations_for(std::vector<int>* rows, const std::vector<int>& algebraic,
+                                       const Point& away, const Point& here) {
   std::vector<char> used(at(here.h.rows()), 0);
   Eigen::VectorXd x, x_here;
   const auto explained = [&](int i, const Dense Point::*C) {
@@ -283,16 +297,15 @@ static std::pair<std::vector<int>, std::vector<char>> rows_in_new_directions(
     for (Eigen::Index e = 0; e < x.size(); ++e)
       if (x[e] != 0.0 || x_here[e] != 0.0) used[at(e)] = 1;
   };
-  for (int i : which) {
+  std::vector<int> kept;
+  for (int i : *rows) {
     if (!explained(i, &Point::C)) continue;
-    Eigen::VectorXd reduced = here.C.row(i).transpose() - here.h.transpose() * x_here;
-    for (int j : algebraic) reduced[j] = 0.0;
-    if (!(plain.rest(reduced).norm() > kRestricts * (1.0 + x_here.norm()))) continue;
-    rows.push_back(i);
+    kept.push_back(i);
     use();
     if (explained(i, &Point::grown)) use();
   }
-  return {rows, used};
+  *rows = kept;
+  return used;
 }
 
 // Marks the algebraic variables that these rows and equations contain at one of the points.
@@ -365,16 +378,18 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
   for (int i = 0; i < n; ++i)
     if (is_equation[at(i)]) equations.push_back(i);
   const bool all_repeat =
-      !found.repeats.empty() && hanging.size() == equations.size() &&
+      !found.repeats.empty() &&
       std::all_of(hanging.begin(), hanging.end(), [&](int i) { return found.repeats[at(i)]; });
   if (index_is_low && all_repeat) return found;
-  if (equations.empty() || !away.evaluate_equations(residual, equations, WT, free, algebraic) ||
-      !here.evaluate_equations(residual, equations, WT, free, algebraic))
+  if (equations.empty() || !here.evaluate_equations(residual, equations, WT, free, algebraic))
     return found;
 
   Span plain;
   for (int i : of_differential) plain.add(here.C.row(i).transpose(), kQuotientRounding);
-  const auto [joint, used] = rows_in_new_directions(hanging, plain, algebraic, away, here);
+  std::vector<int> joint = rows_in_new_directions(hanging, plain, algebraic, here);
+  if (joint.empty() || !away.evaluate_equations(residual, equations, WT, free, algebraic))
+    return found;
+  const std::vector<char> used = equations_for(&joint, algebraic, away, here);
   if (joint.empty()) return found;
   found.moves = algebraic_in(joint, used, algebraic, {away, here});
   // Rows without other algebraic variables move with them. Equations that they repeat are left out.
