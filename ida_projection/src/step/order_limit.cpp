@@ -8,9 +8,7 @@ namespace tether::ida_projection {
 
 namespace {
 
-constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6,
-                 kLogSmall = -1.2;  // of r: 0.7, 0.55, 0.3
-constexpr long kFirstSteps = 60;    // a start excites what is stiff
+constexpr double kLogSmall = -1.2;  // of r: 0.3
 constexpr int kSamples = 6;         // in the mean of log r
 constexpr double kWorth = 0.5;      // of the step before it
 constexpr long kWait = 100;         // steps, after a limit that did not pay
@@ -27,7 +25,7 @@ void OrderLimit::reset() {
 }
 
 void OrderLimit::end() {
-  if (lowering()) settings_.set({});
+  if (now_.phase == Phase::lowering) settings_.set({});
   if (now_.phase == Phase::limited) settings_.limit_order(now_.highest);
   now_.phase = Phase::off;
 }
@@ -51,8 +49,7 @@ void OrderLimit::compare_slopes(const Attempt& attempt, const Candidate& candida
                keeps ? kept_slope_ : slope_);
   if (keeps) return;
   now_.pending.reset();
-  const bool low = now_.phase == Phase::limited || at_start(attempt.steps);
-  if (attempt.order < (low ? kLimit : kLimit + 1)) return;
+  if (attempt.order < (now_.phase == Phase::limited ? kLimit : kLimit + 1)) return;
   N_VLinearSum(1.0, slope_, -1.0, kept_slope_, slope_);
   const double ycor = error_norm(candidate.correction, candidate.weights, differential);
   const double curvature = attempt.h * error_norm(slope_, candidate.weights, differential);
@@ -60,23 +57,11 @@ void OrderLimit::compare_slopes(const Attempt& attempt, const Candidate& candida
     now_.pending = std::log(ycor / curvature) / (attempt.order - 1);
 }
 
-// A start excites what is stiff; orders 3 and 4, which IDA has after a few steps, keep that up.
-bool OrderLimit::at_start(long steps) const {
-  return now_.start != Start::calm && steps < kFirstSteps && now_.limits == 0;
-}
-
 void OrderLimit::watch(const Attempt& attempt) {
-  const double large = now_.start == Start::calm ? kLogLarge : kLogLargeIfStiff;
-  if (at_start(attempt.steps) && (now_.samples == 0 || now_.mean > large)) {
-    now_.start = Start::lowered;
-    now_.phase = Phase::lowering_at_start;
-  } else if (now_.samples == kSamples && now_.mean >= large && attempt.steps >= now_.not_before) {
-    ++now_.limits;
-    now_.samples = 0;
-    now_.phase = Phase::lowering;
-  } else {
-    return;
-  }
+  if (now_.samples < kSamples || now_.mean < now_.large || attempt.steps < now_.not_before) return;
+  ++now_.limits;
+  now_.samples = 0;
+  now_.phase = Phase::lowering;
   now_.tries = 0;
   now_.step_before = attempt.h;
 }
@@ -85,7 +70,6 @@ void OrderLimit::watch(const Attempt& attempt) {
 // underflow make all estimates 0. Only where the error test would be passed: it is not made then.
 Control OrderLimit::lower(const Attempt& attempt, const Candidate& candidate, N_Vector tested) {
   if (attempt.order <= kLimit) {
-    if (now_.phase == Phase::lowering_at_start) return now_.phase = Phase::watching, Control();
     now_.phase = Phase::limited;
     settings_.limit_order(kLimit);  // IDA never raises the order beyond a limit that it has reached
     now_.since = attempt.steps;

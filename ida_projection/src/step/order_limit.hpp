@@ -23,8 +23,7 @@ namespace tether::ida_projection {
 /// which is 2 sin(w h / 2) for the oscillation that dominates the error. A motion worth resolving,
 /// of an amplitude of 1000 tolerances, has r < 0.4 at order 5. Where r stays large, the order is
 /// limited to 2. The limit ends if steps become shorter with it, or if r shows that a higher order
-/// would pay. Where stiff components respond to moves, the first steps return to order 2 each time
-/// that IDA raises it, unless r is small.
+/// would pay.
 ///
 /// To lower the order IDA's error weights are made nearly zero for three steps. All its estimates
 /// are then zero, and it lowers the order by itself; IDAGetErrWeights is meaningless in these
@@ -35,9 +34,7 @@ class OrderLimit {
       : settings_(settings), options_(options) {}
 
   /// Stiff components have responded to moves: oscillations are likely, and expected at smaller r.
-  void expect_oscillations() {
-    if (now_.start == Start::calm) now_.start = Start::stiff;
-  }
+  void expect_oscillations() { now_.large = kLogLargeIfStiff; }
   /// Before the first step.
   void reset();
   /// No limit for the rest of the run.
@@ -47,40 +44,36 @@ class OrderLimit {
   std::optional<Control> control(const Attempt& attempt, const Candidate& candidate,
                                  N_Vector tested, N_Vector differential) {
     if (now_.phase == Phase::off) return {};
-    if (now_.pending && attempt.accepted && !lowering()) take_sample();
+    if (now_.pending && attempt.accepted && now_.phase != Phase::lowering) take_sample();
     if (attempt.steps % kEvery <= 1) compare_slopes(attempt, candidate, differential);
     now_.highest = std::max(now_.highest, attempt.order);
-    if (lowering()) return lower(attempt, candidate, tested);
+    if (now_.phase == Phase::lowering) return lower(attempt, candidate, tested);
     if (now_.phase == Phase::limited)
       judge(attempt);
     else if (attempt.order > kLimit)
       watch(attempt);
     return {};
   }
-  long begun() const { return now_.limits + (now_.start == Start::lowered ? 1 : 0); }
+  long begun() const { return now_.limits; }
 
  private:
-  enum class Phase { off, watching, lowering_at_start, lowering, limited };
-  enum class Start { calm, stiff, lowered };  // lowered: stiff, and the order was lowered early
+  enum class Phase { off, watching, lowering, limited };
 
   static constexpr int kLimit = 2;   // the highest order that damps
   static constexpr long kEvery = 4;  // steps, between two samples of r
+  static constexpr double kLogLarge = -0.36, kLogLargeIfStiff = -0.6;  // of r: 0.7, 0.55
 
   void take_sample();
   void compare_slopes(const Attempt& attempt, const Candidate& candidate, N_Vector differential);
   void watch(const Attempt& attempt);
-  bool at_start(long steps) const;
-  bool lowering() const {
-    return now_.phase == Phase::lowering || now_.phase == Phase::lowering_at_start;
-  }
   Control lower(const Attempt& attempt, const Candidate& candidate, N_Vector tested);
   void judge(const Attempt& attempt);
 
   // From a new run on.
   struct State {
     Phase phase = Phase::off;
-    Start start = Start::calm;
     long limits = 0;
+    double large = kLogLarge;
     std::optional<double> pending;  // log r of an attempt that IDA has not yet judged
     int samples = 0;
     double mean = 0.0;  // of log r
