@@ -328,13 +328,13 @@ static std::vector<char> algebraic_in(
 
 // The unknowns that the equations notice, by large changes near a point where nothing is zero.
 static void find_columns(const Residual& residual, double t, const std::vector<double>& point,
-                         JoinedEquations* found) {
+                         RowsReport& report, JoinedEquations* found) {
   const auto n = static_cast<int>(point.size());
   found->columns.assign(found->equations.size(), {});
   Constraints set = as_constraints(*found, residual, {}, n);
   set.jacobian = FiniteDifferences();
   Statistics uncounted;
-  Evaluator equations(set, uncounted);
+  Evaluator equations(set, uncounted, &report);
   const std::vector<double> any_scale(point.size(), 0.0);
   equations.sensitive(t, point.data(), n, any_scale.data(), [found](int i, int j) {
     std::vector<int>& columns = found->columns[at(i)];
@@ -405,7 +405,7 @@ JoinedEquations find_joined_equations(Evaluator& rows, const Residual& residual,
     if (!used[e] || !together.add(here.h.row(k).transpose(), kProductRounding)) continue;
     found.equations.push_back(equations[e]);
   }
-  find_columns(residual, t, further_away(y, WT), &found);
+  find_columns(residual, t, further_away(y, WT), rows.report, &found);
   return found;
 }
 
