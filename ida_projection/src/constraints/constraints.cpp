@@ -87,11 +87,23 @@ Constraints operator+(Constraints a, const Constraints& b) {
 
 namespace {
 
-std::string unequal(double together, double alone, const char* function) {
+// Fills the report with two values that should be equal, of g (column -1) or C.
+bool tell(const Constraints& constraints, int row, int column, double given, double expected,
+          const char* from_given, const char* from_expected, JacobianReport& report) {
+  report.row = row;
+  report.column = column;
+  report.given = given;
+  report.expected = expected;
   PlainText text;
   text.precision(10);
-  text << "fill_with_value gives " << together << ", " << function << " gives " << alone;
-  return text.str();
+  text << "row " << row << " (" << constraints.name(row) << "), ";
+  if (column < 0)
+    text << "g";
+  else
+    text << "column " << column;
+  text << ": " << from_given << " " << given << ", " << from_expected << " " << expected;
+  report.message = text.str();
+  return false;
 }
 
 // fill_with_value against value and fill, up to the rounding of another order of operations.
@@ -111,24 +123,12 @@ bool check_both(const Constraints& constraints, Evaluator& evaluator, double t, 
   };
   for (int i = 0; i < m; ++i) {
     const double terms = C.row(i).cwiseAbs().dot(y.cwiseAbs().cwiseMax(1.0));
-    const std::string row = "row " + std::to_string(i) + " (" + constraints.name(i) + ")";
-    if (differ(g[i], alone[i], std::max(terms, std::abs(alone[i])))) {
-      report.row = i;
-      report.given = g[i];
-      report.expected = alone[i];
-      report.message = row + ", g: " + unequal(g[i], alone[i], "value");
-      return false;
-    }
-    for (int j = 0; j < n; ++j) {
-      if (!differ(together(i, j), C(i, j), C.row(i).cwiseAbs().maxCoeff())) continue;
-      report.row = i;
-      report.column = j;
-      report.given = together(i, j);
-      report.expected = C(i, j);
-      report.message =
-          row + ", column " + std::to_string(j) + ": " + unequal(together(i, j), C(i, j), "fill");
-      return false;
-    }
+    const char* const from = "fill_with_value gives";
+    if (differ(g[i], alone[i], std::max(terms, std::abs(alone[i]))))
+      return tell(constraints, i, -1, g[i], alone[i], from, "value gives", report);
+    for (int j = 0; j < n; ++j)
+      if (differ(together(i, j), C(i, j), C.row(i).cwiseAbs().maxCoeff()))
+        return tell(constraints, i, j, together(i, j), C(i, j), from, "fill gives", report);
   }
   return true;
 }
@@ -170,20 +170,15 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
       expected(m, n);
   require(evaluator.jacobian(t, y.data(), n, increments.data(), columns, given.data()));
 
-  // Central differences with steps h and h/2, extrapolated: error O(h^4).
-  Eigen::VectorXd at = y, plus(m), minus(m);
+  Eigen::VectorXd at = y;
+  std::vector<double> slope(static_cast<std::size_t>(m)), values(slope);
   for (int j = 0; j < n; ++j) {
-    Eigen::VectorXd slope[2];
-    for (int k = 0; k < 2; ++k) {
-      const double h = 1e-3 * scale[j] / (k + 1);
+    require(central_differences(5e-4 * scale[j], slope, values, [&](double h, auto& g) {
       at[j] = y[j] + h;
-      require(evaluator.value(t, at.data(), n, plus.data()));
-      at[j] = y[j] - h;
-      require(evaluator.value(t, at.data(), n, minus.data()));
-      at[j] = y[j];
-      slope[k] = (plus - minus) / (2.0 * h);
-    }
-    expected.col(j) = (4.0 * slope[1] - slope[0]) / 3.0;
+      return evaluator.value(t, at.data(), n, g.data());
+    }));
+    at[j] = y[j];
+    expected.col(j) = ConstVector(slope.data(), m);
   }
 
   JacobianReport report;
@@ -207,18 +202,15 @@ JacobianReport check_jacobian(const Constraints& constraints, double t, ConstVec
     }
   }
   report.correct = report.worst <= tolerance;
-  if (report.correct) {
-    report.row = report.column = -1;
-    if (evaluator.gives_both())
-      report.correct = check_both(constraints, evaluator, t, y, increments, columns, given,
-                                  tolerance, require, report);
-  } else {
-    PlainText text;
-    text.precision(10);
-    text << "row " << report.row << " (" << constraints.name(report.row) << "), column "
-         << report.column << ": given " << report.given << ", differences give " << report.expected;
-    report.message = text.str();
+  if (!report.correct) {
+    tell(constraints, report.row, report.column, report.given, report.expected, "given",
+         "differences give", report);
+    return report;
   }
+  report.row = report.column = -1;
+  if (evaluator.gives_both())
+    report.correct = check_both(constraints, evaluator, t, y, increments, columns, given, tolerance,
+                                require, report);
   return report;
 }
 

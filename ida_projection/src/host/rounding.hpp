@@ -25,6 +25,9 @@ constexpr double kQuotientRounding = 1e-6, kProductRounding = 10.0 * kQuotientRo
 constexpr int kOneIn = 16;
 constexpr long kMeasureEvery = 64;
 
+/// Whether a row of this length has no direction.
+inline bool vanishes(double norm) { return !(norm > std::numeric_limits<double>::min()); }
+
 /// Between 1 and 2, varies irregularly with j: changes of y in these proportions do not cancel.
 inline double irregular(std::size_t j, double turn = 2.3) {
   return 1.5 + 0.5 * std::sin(1.0 + turn * static_cast<double>(j));

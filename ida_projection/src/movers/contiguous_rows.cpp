@@ -81,23 +81,16 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     if (how != Solve::test) ++statistics_.iterations;
     found.length = length_of_solution();
     if (!rows_.d.rows.empty() && !rows_.a.rows.empty())
-      solved_ = std::max(solved_, length_of_solved());
+      solved_ = std::max(solved_, length_of(rows_.a));
     length_ = found.length;
     return factors == Factors::of_all_rows ? found : with_independent_rows(found, how);
   }
   Status apply(double share, const Candidate& candidate) override {
-    double* const correction = candidate.correction_entries;
     const bool learns = thin_ && !moved_ && share == 1.0;
     moved_ = true;
-    rows_.for_blocks([&](const Block& block) {
-      if (block.first >= 0)
-        take(share, block.dy.data(), static_cast<int>(block.columns.size()),
-             correction + block.first, y_.data() + block.first);
-      else
-        block.for_columns([=, y = y_.data(), dy = block.dy.data()](int k, int i) {
-          correction[i] -= share * dy[k];
-          y[i] -= share * dy[k];
-        });
+    rows_.for_moves([=, ycor = candidate.correction_entries, y = y_.data()](int j, double move) {
+      ycor[j] -= share * move;
+      y[j] -= share * move;
     });
     return learns ? learn_trust(length_) : Status::success;
   }
@@ -115,19 +108,14 @@ class ContiguousRows final : public Newton<ContiguousRows> {
       place(candidate);
       return 0.0;
     }
-    const double *e = N_VGetArrayPointer(change), *w = at_.weight_entries;
+    const double* e = N_VGetArrayPointer(change);
     double* y = y_.data();
     TETHER_ELEMENTWISE
     for (int i = 0; i < unknowns(); ++i) y[i] += e[i];
-    double sum = 0.0;
-    rows_.d.for_columns([&sum, e, w](int, int j) { sum += (e[j] * w[j]) * (e[j] * w[j]); });
-    return wrms(sum);
+    return length_over(rows_.d, [e](int, int j) { return e[j]; });
   }
   double corrected() const override {
-    double sum = 0.0;
-    rows_.d.for_columns(
-        [&](int, int j) { sum += square(at_.correction_entries[j] * at_.weight_entries[j]); });
-    return wrms(sum);
+    return length_over(rows_.d, [e = at_.correction_entries](int, int j) { return e[j]; });
   }
   bool contradicts() override {
     const bool found = drops_rows() && rows_.contradict(WT());
@@ -323,23 +311,18 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     const int rank = counted().rank();
     if (rank > 0) least_ = std::min(least_, counted().independent_part(rank - 1));
   }
-  TETHER_INLINE double length_of_solution() {
+  // In tolerances, of entry(k, j) at the columns j of the block.
+  template <class Entry>
+  TETHER_INLINE double length_over(const Block& block, Entry entry) const {
     double sum = 0.0;
-    const Block& block = rows_.counted();
-    block.for_columns([&sum, dy = block.dy.data(), w = at_.weight_entries](int k, int i) {
-      const double move = dy[k] * w[i];
-      sum += move * move;
-    });
+    block.for_columns(
+        [&sum, entry, w = at_.weight_entries](int k, int j) { sum += square(entry(k, j) * w[j]); });
     return wrms(sum);
   }
-  // The same of the algebraic variables that rows are solved for, beside others.
-  double length_of_solved() const {
-    double sum = 0.0;
-    rows_.a.for_columns([&sum, dy = rows_.a.dy.data(), w = at_.weight_entries](int k, int j) {
-      sum += square(dy[k] * w[j]);
-    });
-    return wrms(sum);
+  TETHER_INLINE double length_of(const Block& block) const {
+    return length_over(block, [dy = block.dy.data()](int k, int) { return dy[k]; });
   }
+  TETHER_INLINE double length_of_solution() { return length_of(rows_.counted()); }
   double length_with(int rank) {
     rows_.counted().dense.use_rank(rank);
     rows_.solve(g_);
@@ -458,14 +441,6 @@ class ContiguousRows final : public Newton<ContiguousRows> {
     length_ = found.length;
     return found;
   }
-  static void take(double share, const double* __restrict dy, int n, double* __restrict ycor,
-                   double* __restrict y) {
-    for (int k = 0; k < n; ++k) {
-      const double move = share * dy[k];
-      ycor[k] -= move;
-      y[k] -= move;
-    }
-  }
 
   Evaluator evaluator_;
   SplitRows rows_;
@@ -476,7 +451,7 @@ class ContiguousRows final : public Newton<ContiguousRows> {
   std::vector<double> y_, WT_, g_;
   std::vector<double> shifted_;     // work space
   double t_ = 0.0, length_ = 0.0;   // of the last evaluation and solution
-  double solved_ = 0.0;             // the longest length_of_solved() of this candidate
+  double solved_ = 0.0;             // the longest length of rows_.a.dy of this candidate
   bool rows_known_ = false;         // C belongs to the present y
   bool thin_ = false;               // some of the factored rows need RowTrust
   bool lasting_ = false;            // the choice of rows is right for the next steps, too

@@ -87,9 +87,9 @@ class LocalMetric {
     for (std::size_t i = 0; i < D_.size(); ++i) {
       if (group[i] < 0) continue;
       const auto k = static_cast<std::size_t>(group[i]);
-      const double WT = w[i] > 0.0 ? 1.0 / w[i] : 0.0;
-      trial_scale_[i] = WT * std::sqrt(group_sum_[k] / group_members_[k]);
-      D_[i] = std::max(trial_scale_[i], kMetricFloor * (WT > 0.0 ? WT : trial_scale_[i]));
+      trial_scale_[i] =
+          w[i] > 0.0 ? 1.0 / w[i] * std::sqrt(group_sum_[k] / group_members_[k]) : 0.0;
+      D_[i] = D(trial_scale_[i], w[i]);
     }
   }
   // Errors of positions are h times those of velocities (method, section 4). Corrections do not

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -47,8 +46,8 @@ class GradientRows {
       N_VProd(row, D, row);
       const double size = norm_[at(i)] = norm(row);
       if (!std::isfinite(size)) return i;
-      if (size > kTiny) N_VScale(1.0 / size, row, row);
-      left_[at(i)] = size > kTiny ? 1.0 : 0.0;
+      if (!vanishes(size)) N_VScale(1.0 / size, row, row);
+      left_[at(i)] = vanishes(size) ? 0.0 : 1.0;
       pivot_[at(i)] = i;
     }
     orthogonalise();
@@ -63,7 +62,7 @@ class GradientRows {
     if (rank_ == 0) N_VConst(0.0, dy);
     for (int k = 0; k < m_; ++k) {
       const int row = pivot_[at(k)];
-      double left = norm_[at(row)] > kTiny ? g[at(row)] / norm_[at(row)] : g[at(row)];
+      double left = vanishes(norm_[at(row)]) ? g[at(row)] : g[at(row)] / norm_[at(row)];
       for (int i = 0; i < std::min(k, rank_); ++i) left -= L(row, i) * z_[at(i)];
       if (k >= rank_) {
         z_[at(k)] = std::abs(left);  // residual of this dropped row
@@ -83,7 +82,7 @@ class GradientRows {
     for (int k = rank_; k < m_; ++k) {
       const int row = pivot_[at(k)];
       const double size = norm_[at(row)];
-      const double left = z_[at(k)] * (size > kTiny ? size : 1.0);
+      const double left = z_[at(k)] * (vanishes(size) ? 1.0 : size);
       if (left <=
           kContradicts * std::sqrt(length_) * tolerance_norm_[at(row)] + 1e2 * kEpsilon * size)
         continue;
@@ -97,7 +96,6 @@ class GradientRows {
   }
 
  private:
-  static constexpr double kTiny = std::numeric_limits<double>::min();
   static constexpr double kDependent = 1e-12;      // of a unit row, for each row
   static constexpr double kReorthogonalise = 0.1;  // of it: where less is left, digits are lost
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tether/linalg/minimum_norm.hpp>
 #include <vector>
 
@@ -54,7 +53,7 @@ class RowTrust {
     double largest = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double norm = solver.row_norm(static_cast<int>(i));
-      if (!(norm > std::numeric_limits<double>::min())) continue;
+      if (vanishes(norm)) continue;
       const auto first = static_cast<std::size_t>(rows[i]) * static_cast<std::size_t>(n);
       double sum = 0.0;
       for (std::size_t k = 0; k < columns.size(); ++k) {

@@ -4,9 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
-#include <limits>
 #include <numeric>
 #include <tether/linalg/index.hpp>
 #include <utility>
@@ -35,8 +32,6 @@ struct LeftOfDropped {
   double tolerances = 0.0;
   int k = -1;
 };
-
-bool vanishes(double norm) { return !(norm > std::numeric_limits<double>::min()); }
 
 LeftOfDropped most_left_of_dropped(const Block& block, const StoredRows& C,
                                    const std::vector<double>& WT) {
@@ -117,17 +112,13 @@ bool StoredRows::has_seen(const std::vector<std::size_t>& entries) const {
   return std::any_of(entries.begin(), entries.end(), [this](std::size_t e) { return seen_[e]; });
 }
 
-// Checks all entries without a branch for each, since hardly ever one has changed.
 bool StoredRows::notice(const std::vector<std::size_t>& entries) {
-  std::uint64_t bits = 0;
+  bool found = false;
   for (const std::size_t e : entries) {
-    std::uint64_t entry;
-    std::memcpy(&entry, &values_[e], sizeof entry);
-    bits |= entry << 1;  // but for the sign
+    seen_[e] |= values_[e] != 0.0;
+    found |= values_[e] != 0.0;
   }
-  if (bits == 0) return false;
-  for (const std::size_t e : entries) seen_[e] |= values_[e] != 0.0;
-  return true;
+  return found;
 }
 
 RowPattern StoredRows::pattern(const std::vector<int>& of_rows) const {
