@@ -10,6 +10,7 @@
 #include "host/rounding.hpp"
 #include "movers/vector/gradient_store.hpp"
 #include "movers/vector/vector_rows.hpp"
+#include "rows/row_trust.hpp"
 
 namespace tether::ida_projection {
 
@@ -20,7 +21,6 @@ using linalg::at;
 // Tight enough for a full row that depends on the others to leave nothing, however small the
 // eigenvalues of H are.
 constexpr double kSolvedForBorder = 1e-11;
-constexpr double kDependent = 1e-5;  // of a full row: solutions with C leave less of it then
 constexpr int kPatience = 20;
 
 // Outcomes by severity, so that the worst one is the largest.
@@ -76,7 +76,7 @@ class Border {
       onto(work_, row);
       N_VLinearSum(1.0, work_, -1.0, row, row);
       divide(N_VGetArrayPointer(row), D, unknowns_);
-      depends_[k] = !(norm(row) > kDependent * before) ? 1 : 0;
+      depends_[k] = !(norm(row) > RowTrust::kDependent * before) ? 1 : 0;
       if (depends_[k] != 0 && std::isfinite(before)) N_VConst(0.0, row);
       divide(N_VGetArrayPointer(row), D, unknowns_);
     }

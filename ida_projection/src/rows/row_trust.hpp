@@ -25,6 +25,7 @@ namespace tether::ida_projection {
 class RowTrust {
  public:
   static constexpr double kThin = 1e-3;
+  static constexpr double kDependent = 1e-5;
 
   using Solver = linalg::MinimumNorm;
 
@@ -71,7 +72,6 @@ class RowTrust {
 
  private:
   static constexpr double kSafety = 2.0;
-  static constexpr double kDependent = 1e-5;
 
   static int rows_from(const Solver& solver, double smallest) {
     int rank = solver.rank();

@@ -145,14 +145,6 @@ double StoredRows::times(int i, const double* y) const {
   return sum;
 }
 
-double StoredRows::times(int i, const std::vector<int>& columns, const double* y) const {
-  if (!full(i)) return times(i, y);
-  const double* const c = entries(i);
-  double sum = 0.0;
-  for (const int j : columns) sum += c[j] * y[j];
-  return sum;
-}
-
 bool Block::contains(int j) const {
   if (first >= 0) return j >= first && j < first + static_cast<int>(columns.size());
   return std::binary_search(columns.begin(), columns.end(), j);
@@ -379,7 +371,7 @@ void SplitRows::solve_blocks(const std::vector<double>& g) {
   if (a.rows.empty()) return;
   if (moves) d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
   for (std::size_t k = 0; k < a.rows.size(); ++k)
-    a.g[k] = g[at(a.rows[k])] - (moves ? C_.times(a.rows[k], d.columns, moved_.data()) : 0.0);
+    a.g[k] = g[at(a.rows[k])] - (moves ? C_.times(a.rows[k], moved_.data()) : 0.0);
   a.solve();
 }
 

@@ -51,8 +51,6 @@ class StoredRows {
   /// sum_j |C_ij y_j| and sum_j C_ij y_j.
   double terms(int i, const double* y) const;
   double times(int i, const double* y) const;
-  /// The latter for a y that is zero outside these columns.
-  double times(int i, const std::vector<int>& columns, const double* y) const;
   /// The columns of these rows that can differ from zero.
   RowPattern pattern(const std::vector<int>& of_rows) const;
 
