@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "event/driver.hpp"
-#include "event/model/scene_model.hpp"
+#include "event/model/model.hpp"
 #include "event_runs.hpp"
 #include "smooth/units.hpp"
 
@@ -13,7 +13,7 @@ using namespace event_runs;
 using tether::scene::event::Bounces;
 using tether::scene::event::Driver;
 using tether::scene::event::DriverOptions;
-using tether::scene::event::SceneModel;
+using tether::scene::event::Model;
 
 namespace {
 
@@ -22,7 +22,7 @@ struct Clearance {
   Scene scene;
   tether::scene::Units units = tether::scene::event::units_of(scene);
   Scene in_units = tether::scene::event::scaled(scene, units);
-  SceneModel model{in_units, units.time};
+  Model model{in_units, units.time};
   double end = scene.end / units.time;
 
   explicit Clearance(double restitution = 0.4) : scene(shipped(restitution)) {}
@@ -229,7 +229,7 @@ TEST_CASE("event: a storm of events is bounded by work, and named") {
       "[scene]\ngravity = [0, 0, -9.81]\nengine = \"event\"\n[event]\n" + ball(1, 0.99), "storm");
   DriverOptions options;
   options.end = 1000;
-  SceneModel model(scene);
+  Model model(scene);
   {
     Driver driver(model, options, 0, model.start());
     driver.advance(90);  // a thousand impacts that come to rest cost far less than the bound
@@ -238,7 +238,7 @@ TEST_CASE("event: a storm of events is bounded by work, and named") {
     CHECK(driver.motion().work_done() < 0.05 * options.storm);
   }
   options.storm = 1e8;
-  SceneModel again(scene);
+  Model again(scene);
   Driver driver(again, options, 0, again.start());
   CHECK_THROWS_WITH(driver.advance(90), Catch::Contains("a storm of events: the last"));
   CHECK(driver.counts().events >= 100);

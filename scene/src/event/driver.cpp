@@ -474,7 +474,7 @@ void Driver::close_contacts(const StartState& start) {
   std::vector<ContactMode> modes(at(model_.contacts()));
   for (const int i : without_doubles(*closed)) {
     modes[at(i)].mode = Mode::slide;
-    modes[at(i)].direction = VectorXd::Unit(model_.tangents(), 0);
+    modes[at(i)].direction = VectorXd::Unit(kTangents, 0);
   }
   motion_.choose(time_, start_.y, std::move(modes));
   motion_.settle_velocities(time_, start_.y);

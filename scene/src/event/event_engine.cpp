@@ -4,7 +4,7 @@
 #include "certificate/instant_scribe.hpp"
 #include "driver.hpp"
 #include "effects/numbers.hpp"
-#include "event/model/scene_model.hpp"
+#include "event/model/model.hpp"
 #include "event/resumable.hpp"
 #include "joints/joint_type.hpp"
 #include "mechanics/force.hpp"
@@ -41,7 +41,7 @@ class EventEngine : public ResumableEngine {
         origin_(event::origin_of(scaled(scene, units_))),
         scene_(event::seen_from(origin_, scaled(scene, units_))),
         options_(driver_options(scene_, units_.time)),
-        model_(std::make_unique<SceneModel>(scene_, units_.time, units_.length)),
+        model_(std::make_unique<Model>(scene_, units_.time, units_.length)),
         reactions_(scene_, mechanics::placed_bodies(scene_)),
         bodies_(mechanics::placed_states(scene)) {
     now_.setZero(model_->coordinates() + model_->velocities() + 1);
@@ -132,7 +132,7 @@ class EventEngine : public ResumableEngine {
   }
   void resume(const SteppedState& state, const Counts& so_far) override {
     // A saved state does not hold what a model remembers of earlier states.
-    auto model = std::make_unique<SceneModel>(scene_, units_.time, units_.length);
+    auto model = std::make_unique<Model>(scene_, units_.time, units_.length);
     const VectorXd y = coordinates_of(state.bodies);
     StartState start = exactness_of(*model, state, y);
     start.so_far = so_far;
@@ -237,7 +237,7 @@ class EventEngine : public ResumableEngine {
   }
   // Contacts that a step has closed fall and are stopped by as much as the accelerations make of
   // it.
-  StartState exactness_of(SceneModel& model, const SteppedState& state, const VectorXd& y) const {
+  StartState exactness_of(Model& model, const SteppedState& state, const VectorXd& y) const {
     constexpr double kLeast = 1e-6;
     model.set(state.time / units_.time, y.data());
     VectorXd a;
@@ -379,8 +379,8 @@ class EventEngine : public ResumableEngine {
       ContactMode& each = m.modes[i];
       auto directions = static_cast<std::int32_t>(each.direction.size());
       io(each.mode, directions);
-      io.demand(each.mode <= Mode::slide && (directions == model_->tangents() ||
-                                             (each.mode != Mode::slide && directions == 0)));
+      io.demand(each.mode <= Mode::slide &&
+                (directions == kTangents || (each.mode != Mode::slide && directions == 0)));
       each.direction.resize(directions);
       io(each.direction);
       Bounces& b = m.bounces[i];
@@ -401,7 +401,7 @@ class EventEngine : public ResumableEngine {
   Vector3d origin_;
   Scene scene_;  // in these units and from this origin, as everything here but the results
   DriverOptions options_;
-  std::unique_ptr<SceneModel> model_;  // forces are found at the state that it is set to
+  std::unique_ptr<Model> model_;  // forces are found at the state that it is set to
   std::unique_ptr<Driver> driver_;
   joints::Reactions reactions_;
   VectorXd now_;

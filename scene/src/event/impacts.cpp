@@ -253,7 +253,7 @@ std::vector<VectorXd> Driver::slides_of(const ContactRows& rows, const VectorXd&
   std::vector<VectorXd> out(rows.contacts().size());
   for (int k = 0; k < static_cast<int>(out.size()); ++k) {
     const int i = rows.contacts()[at(k)];
-    const VectorXd slip = rows.of(k, velocities).tail(model_.tangents());
+    const VectorXd slip = rows.of(k, velocities).tail(kTangents);
     if (i != left.contact || (left.by != Watch::cone && left.by != Watch::slip)) {
       if (slip.norm() > bands().slip(i)) out[at(k)] = slip.normalized();
       continue;
@@ -288,7 +288,7 @@ bool Driver::lifts(const ContactRows& rows, int k, const AccelerationSolution& a
 ContactMode Driver::begins(const ContactRows& rows, int k, const AccelerationSolution& answer,
                            const Left& left) const {
   const int i = rows.contacts()[at(k)];
-  const VectorXd a = rows.of(k, answer.contacts.w).tail(model_.tangents());
+  const VectorXd a = rows.of(k, answer.contacts.w).tail(kTangents);
   // On the border of its cone a contact may be said to slide though nothing moves it.
   const bool still = a.norm() <= kNoChange * answer.scale;
   const bool sticks = answer.contacts.regimes[at(k)] == contact::Regime::sticking || still;

@@ -7,8 +7,8 @@
 // tangents) a limit has the first alone, a bounded law the second.
 #pragma once
 
+#include "contact_law.hpp"
 #include "joints/coordinate.hpp"
-#include "model.hpp"
 
 namespace tether::scene::event {
 

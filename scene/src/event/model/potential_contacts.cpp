@@ -4,7 +4,7 @@
 
 #include "geometry/shape_type.hpp"
 #include "mechanics/force.hpp"
-#include "scene_model.hpp"
+#include "model.hpp"
 
 namespace tether::scene::event {
 

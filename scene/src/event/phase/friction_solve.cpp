@@ -308,7 +308,7 @@ void ContactRows::take_rows() {
     model_.evaluate_contact(contacts_[k], kinematics[k]);
     ConePart p;
     p.first = rows;
-    p.slips = law.is_line() ? 1 : kinematics[k].tangents.isZero(0) ? 0 : model_.tangents();
+    p.slips = law.is_line() ? 1 : kinematics[k].tangents.isZero(0) ? 0 : kTangents;
     p.mu = law.is_bounded() ? 0 : law.friction;
     p.holding = law.is_bounded() ? 0 : model_.holding(contacts_[k]);
     p.bound = std::max(0.0, law.bound);

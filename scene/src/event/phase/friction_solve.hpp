@@ -65,7 +65,7 @@ class ContactRows {
   /// The values of contact k out of those by row: normal, then tangents, zero without a row.
   VectorXd of(int k, const VectorXd& values) const {
     const ConePart& p = parts_[at(k)];
-    VectorXd out = VectorXd::Zero(1 + model_.tangents());
+    VectorXd out = VectorXd::Zero(1 + kTangents);
     if (p.has_normal()) out[0] = values[p.first];
     out.segment(1, p.slips) = p.slip_of(values);
     return out;

@@ -80,21 +80,14 @@ double part_of(double length) {
 // millimetre turns on its pole: a tolerance of its angle is far less of its gap.)
 Bands bands_of(Model& model, double tolerance) {
   Bands out{tolerance, {}};
-  const VectorXd sizes = model.sizes();
-  const int nq = model.coordinates(), nu = model.velocities();
-  const auto speeds = sizes.segment(nq, nu).array();
-  VectorXd gradient(nq);
+  VectorXd gradient(model.coordinates());
   ContactKinematics kinematics;
   for (int i = 0; i < model.contacts(); ++i) {
     model.evaluate_contact(i, kinematics);
     gradient.setZero();
     model.to_coordinates(kinematics.normal.data(), gradient.data());
-    const double gap = (gradient.array() * sizes.head(nq).array()).matrix().norm();
-    const double approach = (kinematics.normal.transpose().array() * speeds).matrix().norm();
-    double slip = 0;
-    for (int k = 0; k < kinematics.tangents.rows(); ++k)
-      slip =
-          std::max(slip, (kinematics.tangents.row(k).transpose().array() * speeds).matrix().norm());
+    const double gap = gradient.norm(), approach = kinematics.normal.norm();
+    const double slip = kinematics.tangents.rowwise().norm().maxCoeff();
     // In the units of the model slower bounces than 1e-7 are as high as rounding.
     out.of.push_back({tolerance * part_of(gap), std::max(tolerance, 1e-7) * part_of(approach),
                       tolerance * part_of(slip)});
@@ -108,7 +101,6 @@ Motion::Motion(Model& model, double tolerance, double t, const VectorXd& y)
     : model_(model),
       nq_(model.coordinates()),
       nu_(model.velocities()),
-      tangents_(model.tangents()),
       modes_(at(model.contacts())),
       levels_(at(model.contacts()), 0.0) {
   u_.setZero(nu_);
@@ -119,15 +111,15 @@ Motion::Motion(Model& model, double tolerance, double t, const VectorXd& y)
 
 void Motion::slips_with_friction(double t, const double* y, VectorXd& slips) {
   set(t, y);
-  slips.resize(tangents_ * static_cast<Eigen::Index>(closed_.size()));
+  slips.resize(kTangents * static_cast<Eigen::Index>(closed_.size()));
   Eigen::Index size = 0;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int contact = closed_[k];
     const ContactLaw law = model_.law(contact);
     if (sticks(k) || law.friction == 0 || law.is_bounded()) continue;
     model_.evaluate_contact(contact, kinematics_[k]);
-    slips.segment(size, tangents_) = held_slip(static_cast<int>(k));
-    size += tangents_;
+    slips.segment(size, kTangents) = held_slip(static_cast<int>(k));
+    size += kTangents;
   }
   slips.conservativeResize(size);
 }
@@ -160,7 +152,7 @@ void Motion::choose(double t, const VectorXd& y, std::vector<ContactMode> modes)
   lambda_.setZero(rows_);
   gather();
   const int rank = choose_rows();
-  if (rows_ > 0) islands_.choose(R_, C_, model_.velocity_block());
+  if (rows_ > 0) islands_.choose(R_, C_);
   VectorXd y_rate(size());
   rate(t, y.data(), y_rate.data());
   choose_energy_row(rank);
@@ -418,14 +410,14 @@ std::vector<VectorXd> Motion::contact_forces() {
   bool lawful = true;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int contact = static_cast<int>(k);
-    VectorXd& force = out.emplace_back(1 + tangents_);
+    VectorXd& force = out.emplace_back(1 + kTangents);
     force << normal_force(contact), friction_force(contact);
     largest = std::max(largest, force.norm());
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const double least = -kNoForce * largest, mu = friction(k);
     lawful =
-        lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(tangents_).norm() >= least;
+        lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(kTangents).norm() >= least;
   }
   if (lawful || !is_hyperstatic()) return out;
   ContactRows rows(model_, closed_);
@@ -435,7 +427,7 @@ std::vector<VectorXd> Motion::contact_forces() {
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const VectorXd force = rows.of(static_cast<int>(k), answer.contacts.x);
     const int from = 1 - normals_of(k);  // of the others the normal force is known
-    out[k].tail(1 + tangents_ - from) = force.tail(1 + tangents_ - from);
+    out[k].tail(1 + kTangents - from) = force.tail(1 + kTangents - from);
   }
   return out;
 }
@@ -446,13 +438,13 @@ VectorXd Motion::friction_force(int closed) const {
   const ContactLaw law = model_.law(closed_[k]);
   if (sticks(k)) {
     const int n = tangents_of(k);
-    VectorXd force = VectorXd::Zero(tangents_);
+    VectorXd force = VectorXd::Zero(kTangents);
     force.head(n) = lambda_.segment(row + normals_of(k), n);
     return force;
   }
   if (law.is_bounded()) return -bound(k) * modes_[at(closed_[k])].direction;
   const double mu = law.friction;
-  if (mu == 0) return VectorXd::Zero(tangents_);
+  if (mu == 0) return VectorXd::Zero(kTangents);
   const VectorXd s = held_slip(closed);
   return -mu * lambda_[normal_row(k)] / s.norm() * s;
 }
@@ -508,11 +500,11 @@ void Motion::constraints(double t, const double* y, double* g) {
 // Derivatives of the contacts of the body whose coordinate j is changed in the state set.
 void Motion::differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
                                     Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
-  const int block = model_.velocity_block(), body = j / model_.coordinate_block();
+  const int body = j / 7;
   VectorXd now;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int row = row_of_[k], normals = normals_of(k), rows = normals + tangents_of(k);
-    if (rows == 0 || R_.block(row, block * body, rows, block).isZero(0)) continue;
+    if (rows == 0 || R_.block(row, 6 * body, rows, 6).isZero(0)) continue;
     ContactKinematics& kinematics = kinematics_[k];
     model_.evaluate_contact(closed_[k], kinematics);
     now.resize(rows);

@@ -30,7 +30,7 @@ struct Bands {
   struct Band {
     double gap, approach, slip;
   };
-  double part = 0;  ///< the tolerance; of the largest force, and of sizes
+  double part = 0;  ///< the tolerance; of the largest force
   std::vector<Band> of;
 
   double of_accelerations() const { return 0.1 * part; }  ///< of the largest
@@ -155,7 +155,7 @@ class Motion {
     return model_.law(closed_[closed]).has_normal() ? 1 : 0;
   }
   int tangents_of(std::size_t closed) const {
-    return !sticks(closed) ? 0 : model_.law(closed_[closed]).is_line() ? 1 : tangents_;
+    return !sticks(closed) ? 0 : model_.law(closed_[closed]).is_line() ? 1 : kTangents;
   }
   /// Its own, or that which holds it.
   int normal_row(std::size_t closed) const { return row_of_[holder_[closed]]; }
@@ -196,7 +196,7 @@ class Motion {
 
   Model& model_;
   Bands bands_;
-  int nq_, nu_, tangents_;
+  int nq_, nu_;
   std::vector<ContactMode> modes_;  // of all contacts
   std::vector<double> levels_;
   std::vector<int> closed_, row_of_;

@@ -17,11 +17,10 @@ constexpr double kLargestStateChange = 1e-5;  // of the state, since d(y')/dy wa
 
 Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const VectorXd& y,
              double longest_first, double length)
-    : IdaEquations(tolerance, tolerance * motion.model().sizes()),
+    : IdaEquations(tolerance, VectorXd::Constant(motion.size(), tolerance)),
       motion_(motion),
       start_(t),
       length_(length),
-      sizes_(motion.model().sizes()),
       rate_(motion.size()) {
   const int N = motion.size();
   VectorXd yp(N);
@@ -29,7 +28,7 @@ Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const 
   const VectorXd id = VectorXd::Ones(N);
   const IdaSession::Start start{0, y, yp, id};
   session_.emplace(context_, start, *this, max_step);
-  const double h = first_step(tolerance, 0.1, sizes_, start,  // at most a tenth of its time unit
+  const double h = first_step(tolerance, 0.1, id, start,  // at most a tenth of its time unit
                               [&](double at, VectorXd& ahead, VectorXd& rate_ahead) {
                                 motion.rate(start_ + at, ahead.data(), rate_ahead.data());
                               });
@@ -45,9 +44,8 @@ Phase::Phase(Motion& motion, double tolerance, double max_step, double t, const 
 // The force of a slip s turns with 1 / |s|.
 bool Phase::has_turned(double t, N_Vector y) {
   motion_.slips_with_friction(start_ + t, N_VGetArrayPointer(y), slips_);
-  const Eigen::Index n = motion_.model().tangents();
-  for (Eigen::Index k = 0; k < slips_.size(); k += n) {
-    const auto now = slips_.segment(k, n), then = slips_of_matrix_.segment(k, n);
+  for (Eigen::Index k = 0; k < slips_.size(); k += kTangents) {
+    const auto now = slips_.segment(k, kTangents), then = slips_of_matrix_.segment(k, kTangents);
     if ((now - then).norm() > kLargestSlipChange * std::min(now.norm(), then.norm())) return true;
   }
   return false;
@@ -64,7 +62,9 @@ void Phase::project() {
       [this](double t, ida_projection::ConstVector at, ida_projection::Matrix C) {
         motion_.constraint_gradient(start_ + t, at.data(), C);
       });
-  session_->project(constraints, {});
+  ida_projection::Options options;
+  options.advanced.smooth_where_needed = false;  // F gives all of y': its index need not be found
+  session_->project(constraints, options);
 }
 
 // The first steps of a phase move the state by nothing: what changes is cj. Where IDA asks twice at
@@ -75,8 +75,7 @@ bool Phase::may_reuse(double t, N_Vector y) {
   if (failed || slope_at_.size() == 0) return false;
   for (Eigen::Index i = 0; i < slope_at_.size(); ++i) {
     const double there = N_VGetArrayPointer(y)[i];
-    if (!(std::abs(there - slope_at_[i]) <=
-          kLargestStateChange * size_of(static_cast<int>(i), there)))
+    if (!(std::abs(there - slope_at_[i]) <= kLargestStateChange * (1 + std::abs(there))))
       return false;
   }
   return !has_turned(t, y);
@@ -94,7 +93,7 @@ void Phase::differentiate(double t, const double* y) {
   slope_.setZero(N, N);
   for (int j = 0; j < N; ++j) {
     if (j == motion_.work()) continue;
-    double step = 1e-7 * std::max(sizes_[j], std::abs(slope_at_[j]));  // the root of rounding
+    double step = 1e-7 * std::max(1.0, std::abs(slope_at_[j]));  // the root of rounding
     if (j >= motion_.coordinates()) step = std::min(step, longest);
     near[j] = slope_at_[j] + step;
     motion_.rate(start_ + t, near.data(), near_rate.data());
@@ -135,7 +134,6 @@ void Phase::step() {
 bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd& y) {
   const int m = motion.constraint_count();
   if (m == 0) return true;
-  const VectorXd sizes = motion.model().sizes();
   VectorXd g(m);
   Eigen::Matrix<double, -1, -1, Eigen::RowMajor> C(m, motion.size());
   double before = 0;
@@ -145,10 +143,10 @@ bool move_onto_constraints(Motion& motion, double tolerance, double t, VectorXd&
     C.setZero();
     motion.constraint_gradient(t, y.data(), C);
     linalg::LeastSquares factor(kDependent);
-    factor.factor(C * sizes.asDiagonal());
+    factor.factor(C);
     const VectorXd move = factor.solve(g);
-    y -= sizes.cwiseProduct(move);
-    const double size = 1 + y.cwiseQuotient(sizes).cwiseAbs().maxCoeff();
+    y -= move;
+    const double size = 1 + y.cwiseAbs().maxCoeff();
     const double moved = move.cwiseAbs().maxCoeff();
     // The rest is rounding of gaps, which for large fixed bodies exceeds that of coordinates.
     const bool rounding = pass > 0 && moved >= 0.5 * before && moved <= 0.1 * tolerance * size;

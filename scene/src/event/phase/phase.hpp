@@ -43,14 +43,13 @@ class Phase : public IdaEquations {
   }
   void jacobian(double t, double cj, N_Vector y, N_Vector yp, SUNMatrix J) override;
   void project();
-  double size_of(int i, double value) const { return sizes_[i] + std::abs(value); }
   bool has_turned(double t, N_Vector y);
   bool may_reuse(double t, N_Vector y);
   void differentiate(double t, const double* y);
 
   Motion& motion_;
   double start_, begin_ = 0, end_ = 0, length_;
-  VectorXd sizes_, rate_;
+  VectorXd rate_;
   QuietContext context_;
   OwnedMatrix matrix_;
   OwnedLinearSolver solver_;

@@ -13,16 +13,14 @@ namespace tether::scene::event {
 /// not meet in it: each such island has factors of its own.
 class RowIslands {
  public:
-  /// By what rows and columns are not zero in; bodies have `block` velocities each.
-  void choose(const MatrixXd& R, const MatrixXd& C, int block) {
-    const int rows = static_cast<int>(R.rows()), bodies = static_cast<int>(R.cols()) / block;
+  /// By what rows and columns are not zero in; bodies have six velocities each.
+  void choose(const MatrixXd& R, const MatrixXd& C) {
+    const int rows = static_cast<int>(R.rows()), bodies = static_cast<int>(R.cols()) / 6;
     std::vector<int> first(at(rows), -1);
     linalg::DisjointSets sets(bodies);
     for (int i = 0; i < rows; ++i)
       for (int b = 0; b < bodies; ++b) {
-        if (R.row(i).segment(block * b, block).isZero(0) &&
-            C.col(i).segment(block * b, block).isZero(0))
-          continue;
+        if (R.row(i).segment<6>(6 * b).isZero(0) && C.col(i).segment<6>(6 * b).isZero(0)) continue;
         if (first[at(i)] < 0) first[at(i)] = b;
         sets.join(b, first[at(i)]);
       }
@@ -39,7 +37,7 @@ class RowIslands {
     }
     for (int b = 0; b < bodies; ++b)
       if (const int k = island_of[at(sets.root(b))]; k >= 0)
-        for (int j = 0; j < block; ++j) islands_[at(k)].velocities.push_back(block * b + j);
+        for (int j = 0; j < 6; ++j) islands_[at(k)].velocities.push_back(6 * b + j);
   }
   /// MC: M^-1 C S.
   void factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& scale) {

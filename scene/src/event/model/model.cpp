@@ -1,6 +1,6 @@
 // Tether: the bodies, joints, forces and contacts of a scene as a model of the event engine.
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene_model.hpp"
+#include "model.hpp"
 
 #include "bounds.hpp"
 #include "effects/list.hpp"
@@ -35,7 +35,7 @@ struct Material {
 
 }  // namespace
 
-SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
+Model::Model(const Scene& scene, double time_unit, double length_unit)
     : time_unit_(time_unit),
       length_unit_(length_unit),
       bodies_(scene),
@@ -61,9 +61,7 @@ SceneModel::SceneModel(const Scene& scene, double time_unit, double length_unit)
   settle();
 }
 
-SceneModel::~SceneModel() = default;
-
-void SceneModel::find_holding(const Scene& scene) {
+void Model::find_holding(const Scene& scene) {
   for (const Pair& from : scene.pairs)
     for (std::size_t k = 0; from.static_friction && k < pairs_.size(); ++k) {
       const std::string &a = scene.bodies[at(pairs_[k].first)].material,
@@ -78,7 +76,7 @@ void SceneModel::find_holding(const Scene& scene) {
     holding_[k] = std::max(holding_[k], pairs_[k].friction);
 }
 
-void SceneModel::set(double t, const double* y) {
+void Model::set(double t, const double* y) {
   for (int k = 0; k < bodies_.count(); ++k) {
     std::copy_n(y + 7 * k, 7, y_.data() + kBody * k);
     std::copy_n(y + coordinates() + 6 * k, 6, y_.data() + kBody * k + kVelocity);
@@ -89,7 +87,7 @@ void SceneModel::set(double t, const double* y) {
   bodies_.set_turns(y_.data());
 }
 
-void SceneModel::settle() {
+void Model::settle() {
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (!axes_[i].isZero(0) && pairs_[i].is_apart(bodies_.all(), 0)) continue;
     const Vector3d normal = pairs_[i].touch(bodies_.all()).normal;
@@ -101,7 +99,7 @@ void SceneModel::settle() {
   }
 }
 
-void SceneModel::forces(VectorXd& h) {
+void Model::forces(VectorXd& h) {
   clear(loads_);
   for (const auto& force : forces_) force->add(bodies_.all(), loads_);
   h.resize(velocities());
@@ -112,7 +110,7 @@ void SceneModel::forces(VectorXd& h) {
   }
 }
 
-void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) {
+void Model::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) {
   const Bodies& bodies = bodies_.all();
   g.resize(rows_.count());
   rows_.gradient(bodies, W);
@@ -123,7 +121,7 @@ void SceneModel::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest
   rows_.each([&](const auto& row) { row.rate_by_time(rate.data() + row.row); });
 }
 
-void SceneModel::evaluate_contact(int contact, ContactKinematics& out) {
+void Model::evaluate_contact(int contact, ContactKinematics& out) {
   if (is_law(contact)) return laws_.evaluate_contact(contact - pairs(), bodies_.all(), out);
   if (is_moment(contact)) return evaluate_moment(moment(contact), out);
   const FeaturePair& p = pair(contact);
@@ -169,15 +167,14 @@ void SceneModel::evaluate_contact(int contact, ContactKinematics& out) {
   for (int k = 0; k < 2; ++k) put(k, tangent[at(k)]);
 }
 
-Vector3d SceneModel::relative_velocity(const FeaturePair& p, const Touch& touch) const {
+Vector3d Model::relative_velocity(const FeaturePair& p, const Touch& touch) const {
   const Frame<double>&A = bodies_.all().frames[at(p.first)],
         &B = bodies_.all().frames[at(p.second)];
   return A.v + A.W.cross(touch.point - A.x) - B.v - B.W.cross(touch.point - B.x);
 }
 
 // The axis along the normal has no direction there: any one is taken.
-std::array<Jet<double>, 2> SceneModel::scaled_tangents(const FeaturePair& p,
-                                                       const Touch& touch) const {
+std::array<Jet<double>, 2> Model::scaled_tangents(const FeaturePair& p, const Touch& touch) const {
   const EllipticFriction& e = *p.elliptic;
   const Frame<double>& f = bodies_.all().frames[at(e.body)];
   const Vector3d &n = touch.normal, &n1 = touch.normal_rate, axis = f.R * e.axis,
@@ -202,7 +199,7 @@ std::array<Jet<double>, 2> SceneModel::scaled_tangents(const FeaturePair& p,
   return {first, second};
 }
 
-Jet<double> SceneModel::surface_velocity(int body, const Touch& touch) const {
+Jet<double> Model::surface_velocity(int body, const Touch& touch) const {
   Jet<double> out;
   out.x = out.x1 = Vector3d::Zero();
   if (!conveys(body)) return out;
@@ -216,7 +213,7 @@ Jet<double> SceneModel::surface_velocity(int body, const Touch& touch) const {
 
 // Slip e.w of the turning w of one body against the other, e a tangent, or the normal; where it
 // turns, (e.w)' = e.w' + e'.w.
-void SceneModel::evaluate_moment(const ContactLaw& moment, ContactKinematics& out) {
+void Model::evaluate_moment(const ContactLaw& moment, ContactKinematics& out) {
   const FeaturePair& p = pair(moment.held_by);
   const Bodies& bodies = bodies_.all();
   const Touch touch = p.touch(bodies);
@@ -245,7 +242,7 @@ void SceneModel::evaluate_moment(const ContactLaw& moment, ContactKinematics& ou
   }
 }
 
-Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
+Vector3d Model::in_space(int contact, const VectorXd& parts) {
   if (is_law(contact)) return (parts[0] + parts[1]) * law_direction(contact);
   const bool turns = is_moment(contact), spins = turns && moment(contact).is_line();
   if (turns) contact = moment(contact).held_by;
@@ -260,17 +257,17 @@ Vector3d SceneModel::in_space(int contact, const VectorXd& parts) {
   return (turns ? 0 : parts[0]) * normal + parts[1] * tangent[0] + parts[2] * tangent[1];
 }
 
-bool SceneModel::are_at_one_edge(int contact, int other, double distance) {
+bool Model::are_at_one_edge(int contact, int other, double distance) {
   return square_between(contact, other, distance) > kOtherNormal;
 }
 
-bool SceneModel::are_one(int contact, int other, double distance) {
+bool Model::are_one(int contact, int other, double distance) {
   if (contact == other) return true;
   const double square = square_between(contact, other, distance);
   return square >= 0 && square <= kOtherNormal;
 }
 
-void SceneModel::energy_gradient(double* by_q, double* by_u) const {
+void Model::energy_gradient(double* by_q, double* by_u) const {
   std::vector<double> row(at(kBody * bodies_.count()));
   for (const auto& force : forces_) force->add_potential_gradient(bodies_.all(), row.data());
   for (int k = 0; k < bodies_.count(); ++k) {
