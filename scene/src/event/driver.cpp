@@ -92,11 +92,8 @@ Driver::Driver(Model& model, const DriverOptions& options, double t, const Vecto
 }
 
 void Driver::check_start() const {
-  VectorXd g, rate, rest;
-  MatrixXd W;
-  model_.joints(g, W, rate, rest);
+  const VectorXd g = model_.joint_values<0>(), speeds = model_.joint_values<1>();
   const VectorXd u = start_.y.segment(motion_.coordinates(), motion_.velocities());
-  const VectorXd speeds = W * u + rate;
   const double size = std::max(1.0, start_.y.head(motion_.coordinates()).cwiseAbs().maxCoeff());
   const double speed = u.size() > 0 ? std::max(1.0, u.cwiseAbs().maxCoeff()) : 1;
   for (int i = 0; i < g.size(); ++i)

@@ -115,13 +115,6 @@ class Driver {
     model_.set(time_, y.data());
     return y;
   }
-  /// The same, and the motion has the accelerations and forces there.
-  VectorXd state_with_forces() {
-    const VectorXd y = state();
-    VectorXd rate(motion_.size());
-    motion_.rate(time_, y.data(), rate.data());
-    return y;
-  }
   const std::vector<EventRecord>& events() const { return events_; }
   Counts counts() const {
     Counts all = counts_;

@@ -76,7 +76,7 @@ class EventEngine : public ResumableEngine {
     return *contacts_;
   }
   Forces forces() const override {
-    driver_->state_with_forces();
+    find_forces();
     return forces_of_motion();
   }
   const std::vector<ContactEvent>& events() const override { return events_; }
@@ -207,9 +207,7 @@ class EventEngine : public ResumableEngine {
     scribe_->put_impact(units_.time * bodies.all().time, came, after, contacts, rest, exact);
   }
   std::vector<std::array<Vector3d, 2>> accelerations() const {
-    const VectorXd y = driver_->state();
-    VectorXd rate(driver_->motion().size());
-    driver_->motion().rate(driver_->time(), y.data(), rate.data());
+    const VectorXd rate = find_forces();
     std::vector<std::array<Vector3d, 2>> out;
     for (int k = 0; k < model_->bodies().count(); ++k) {
       const Vector3d a = rate.segment<3>(model_->coordinates() + 6 * k);
@@ -298,19 +296,23 @@ class EventEngine : public ResumableEngine {
       if (model_->is_pair(i) && (closed || std::isinf(model_->margin(i))))
         d.penetration = std::max(d.penetration, -model_->gap(i, rate) * units_.length);
     }
-    VectorXd g, rate, rest;
-    MatrixXd W;
-    model_->joints(g, W, rate, rest);
+    const VectorXd g = model_->joint_values<0>();
     if (g.size() > 0) d.drift = g.cwiseAbs().maxCoeff() * units_.length;
     smooth::to_si(units_, d);
     diagnostics_ = d;
     append_events();
   }
+  // The rate of this state; the motion has its forces from here on.
+  VectorXd find_forces() const {
+    VectorXd rate(now_.size());
+    driver_->motion().rate(driver_->time(), now_.data(), rate.data());
+    return rate;
+  }
   std::vector<ContactState> contact_states() const {
     event::Motion& motion = driver_->motion();
     const std::vector<int>& closed = motion.closed();
     if (closed.empty()) return {};
-    driver_->state_with_forces();
+    find_forces();
     const std::vector<VectorXd> forces = motion.contact_forces();
     std::vector<ContactState> out =
         states_of(closed, units_.force(), [&](std::size_t k) { return forces[k]; });

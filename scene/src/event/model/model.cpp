@@ -110,14 +110,10 @@ void Model::forces(VectorXd& h) {
   }
 }
 
-void Model::joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest) {
-  const Bodies& bodies = bodies_.all();
-  g.resize(rows_.count());
-  rows_.gradient(bodies, W);
+void Model::joints(MatrixXd& W, VectorXd& rate, VectorXd& rest) const {
+  rows_.gradient(bodies_.all(), W);
   rate.resize(rows_.count());
-  rest.resize(rows_.count());
-  rows_.values<0>(bodies, g.data());
-  rows_.values<2>(bodies, rest.data());
+  rest = joint_values<2>();
   rows_.each([&](const auto& row) { row.rate_by_time(rate.data() + row.row); });
 }
 

@@ -89,8 +89,15 @@ class Model {
   void divide_by_mass(Eigen::Ref<MatrixXd> X) const { bodies_.divide_by_mass(X); }
   /// Forces without joints and contacts, gyroscopic ones included.
   void forces(VectorXd& h);
-  /// g, and with W: g' = W u + rate, g'' = W u' + rest.
-  void joints(VectorXd& g, MatrixXd& W, VectorXd& rate, VectorXd& rest);
+  /// g, or its rate, of the rows of joints.
+  template <int order>
+  VectorXd joint_values() const {
+    VectorXd out(rows_.count());
+    rows_.values<order>(bodies_.all(), out.data());
+    return out;
+  }
+  /// With W: g' = W u + rate, g'' = W u' + rest.
+  void joints(MatrixXd& W, VectorXd& rate, VectorXd& rest) const;
   std::string joint_name(int row) const { return "joint \"" + rows_.joint_of(row) + "\""; }
   std::string contact_name(int contact) const {
     if (is_moment(contact)) contact = moment(contact).held_by;

@@ -281,8 +281,8 @@ ContactRows::ContactRows(Model& model, std::vector<int> contacts)
   PL_ = L_.transpose();
   model.divide_by_mass(PL_);
   if (model.joint_rows() > 0) {
-    VectorXd g, rate;
-    model.joints(g, G_, rate, joint_rest_);
+    VectorXd rate;
+    model.joints(G_, rate, joint_rest_);
     MG_ = G_.transpose();
     model.divide_by_mass(MG_);
     factor_joints();

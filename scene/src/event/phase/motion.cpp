@@ -201,7 +201,7 @@ void Motion::choose_joints() {
   joints_ = 0;
   joints_in_use_.clear();
   if (model_.joint_rows() == 0) return;
-  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  model_.joints(joint_W_, joint_rate_, joint_rest_);
   const RowChoice choice(joint_W_.transpose());
   joints_in_use_ = std::move(choice.rows);
   joints_ = static_cast<int>(joints_in_use_.size());
@@ -216,17 +216,16 @@ bool Motion::other_joint_rows_are_better(double t, const VectorXd& y) {
   const double now = RowChoice(joint_W_.topRows(joints_).transpose()).least;
   if (now > kWeakened * least_joint_row_) return false;
   least_joint_row_ = std::min(least_joint_row_, now);
-  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  model_.joints(joint_W_, joint_rate_, joint_rest_);
   return now <= kWeakened * RowChoice(joint_W_.transpose()).least;
 }
 
 // Those in use, first.
 void Motion::evaluate_joints() {
-  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  model_.joints(joint_W_, joint_rate_, joint_rest_);
   for (int k = 0; k < joints_; ++k) {
     const int from = joints_in_use_[at(k)];
     if (from == k) continue;
-    joint_g_[k] = joint_g_[from];
     joint_W_.row(k) = joint_W_.row(from);
     joint_rate_[k] = joint_rate_[from];
     joint_rest_[k] = joint_rest_[from];
@@ -369,7 +368,7 @@ void Motion::finish_rate(double* y_rate) {
 VectorXd Motion::joint_forces() {
   const int rows = model_.joint_rows();
   if (joints_ == rows) return lambda_.head(joints_);
-  model_.joints(joint_g_, joint_W_, joint_rate_, joint_rest_);
+  model_.joints(joint_W_, joint_rate_, joint_rest_);
   VectorXd load = VectorXd::Zero(nu_);
   for (int k = 0; k < joints_; ++k)
     load += lambda_[k] * joint_W_.row(joints_in_use_[at(k)]).transpose();
@@ -452,28 +451,36 @@ VectorXd Motion::friction_force(int closed) const {
 // Gaps and joints, their rates, the slips of stuck contacts, the rows of the model itself, and
 // energy less work (method, eq. 3).
 
+// Rates of the rows of a contact, whose kinematics are evaluated.
+VectorXd Motion::rates_of_contact(std::size_t k) const {
+  const ContactKinematics& kinematics = kinematics_[k];
+  const int normals = normals_of(k), tangents = tangents_of(k);
+  VectorXd out(normals + tangents);
+  if (normals > 0) out[0] = kinematics.normal.dot(u_) + kinematics.normal_rate;
+  out.tail(tangents) = slip_of(kinematics).head(tangents);
+  return out;
+}
+
 // Values of all rows at the state that is set; slips have no position.
 void Motion::values_of_rows(VectorXd& positions, VectorXd& rates) {
   positions.setZero(rows_);
-  gather();
-  rates = R_ * u_;
+  rates.resize(rows_);
   if (joints_ > 0) {
-    positions.head(joints_) = joint_g_.head(joints_);
-    rates.head(joints_) += joint_rate_.head(joints_);
+    positions.head(joints_) = model_.joint_values<0>()(joints_in_use_);
+    rates.head(joints_) = model_.joint_values<1>()(joints_in_use_);
   }
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const int row = row_of_[k], tangents = tangents_of(k);
-    if (normals_of(k) > 0) {
-      positions[row] = kinematics_[k].gap - levels_[at(closed_[k])];
-      rates[row] += kinematics_[k].normal_rate;
-    }
-    rates.segment(row + normals_of(k), tangents) += kinematics_[k].slip_rate.head(tangents);
+    const int row = row_of_[k], normals = normals_of(k);
+    model_.evaluate_contact(closed_[k], kinematics_[k]);
+    if (normals > 0) positions[row] = kinematics_[k].gap - levels_[at(closed_[k])];
+    rates.segment(row, normals + tangents_of(k)) = rates_of_contact(k);
   }
 }
 
 void Motion::settle_velocities(double t, VectorXd& y) {
   if (rows_ == 0) return;
   set(t, y.data());
+  gather();
   VectorXd positions, rates;
   values_of_rows(positions, rates);
   MatrixXd columns = R_.transpose() * row_scale_.asDiagonal();
@@ -497,30 +504,32 @@ void Motion::constraints(double t, const double* y, double* g) {
   if (energy_row_ != EnergyRow::none) *g = model_.energy() - y[work()] - kept_energy_;
 }
 
-// Derivatives of the contacts of the body whose coordinate j is changed in the state set.
-void Motion::differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
-                                    Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
+// Derivatives of rates by coordinate j, which is changed in the state that is set.
+void Motion::differentiate_rates(int j, double step, const VectorXd& rates, int first_rate,
+                                 Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
+  const auto put = [&](int row, double now) {
+    if (const int place = rate_place_[at(row)]; place >= 0)
+      C(first_rate + place, j) = (now - rates[row]) / step;
+  };
+  if (joints_ > 0) {
+    const VectorXd now = model_.joint_values<1>();
+    for (int i = 0; i < joints_; ++i) put(i, now[joints_in_use_[at(i)]]);
+  }
   const int body = j / 7;
-  VectorXd now;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const int row = row_of_[k], normals = normals_of(k), rows = normals + tangents_of(k);
+    const int row = row_of_[k], rows = normals_of(k) + tangents_of(k);
     if (rows == 0 || R_.block(row, 6 * body, rows, 6).isZero(0)) continue;
-    ContactKinematics& kinematics = kinematics_[k];
-    model_.evaluate_contact(closed_[k], kinematics);
-    now.resize(rows);
-    if (normals > 0) now[0] = kinematics.normal.dot(u_) + kinematics.normal_rate;
-    now.tail(rows - normals) =
-        (kinematics.tangents * u_ + kinematics.slip_rate).head(rows - normals);
-    for (int r = 0; r < rows; ++r)
-      if (const int place = rate_place_[at(row + r)]; place >= 0)
-        C(first_rate + place, j) = (now[r] - rates[row + r]) / step;
+    model_.evaluate_contact(closed_[k], kinematics_[k]);
+    const VectorXd now = rates_of_contact(k);
+    for (int r = 0; r < rows; ++r) put(row + r, now[r]);
   }
 }
 
 void Motion::constraint_gradient(double t, const double* y,
                                  Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C) {
   set(t, y);
-  VectorXd positions, rates, moved;
+  gather();
+  VectorXd positions, rates;
   values_of_rows(positions, rates);
   int out = 0;
   Eigen::RowVectorXd line(nu_);
@@ -542,14 +551,7 @@ void Motion::constraint_gradient(double t, const double* y,
     near[j] = y[j] + step;
     set(t, near.data());
     near[j] = y[j];
-    if (joints_ == 0) {
-      differentiate_contacts(j, step, rates, first_rate, C);
-      continue;
-    }
-    values_of_rows(positions, moved);
-    for (std::size_t k = 0; k < rates_in_use_.size(); ++k)
-      C(first_rate + static_cast<int>(k), j) =
-          (moved[rates_in_use_[k]] - rates[rates_in_use_[k]]) / step;
+    differentiate_rates(j, step, rates, first_rate, C);
   }
   set(t, y);
 }

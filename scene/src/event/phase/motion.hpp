@@ -187,8 +187,9 @@ class Motion {
   void finish_rate(double* y_rate);
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
-  void differentiate_contacts(int j, double step, const VectorXd& rates, int first_rate,
-                              Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
+  VectorXd rates_of_contact(std::size_t closed) const;
+  void differentiate_rates(int j, double step, const VectorXd& rates, int first_rate,
+                           Eigen::Ref<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> C);
   int choose_rows();
   void choose_energy_row(int rank);
   void choose_joints();
@@ -212,7 +213,7 @@ class Motion {
   enum class EnergyRow : unsigned char { none, energy, less_work } energy_row_ = EnergyRow::energy;
 
   VectorXd u_, h_, a_, lambda_, r_;
-  VectorXd joint_g_, joint_rate_, joint_rest_, row_scale_;
+  VectorXd joint_rate_, joint_rest_, row_scale_;
   MatrixXd joint_W_, R_, C_, MC_;
   RowIslands islands_;
   std::vector<std::size_t> sharing_;           // closed laws that share their bounds

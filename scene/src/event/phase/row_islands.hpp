@@ -25,6 +25,7 @@ class RowIslands {
         sets.join(b, first[at(i)]);
       }
     islands_.clear();
+    R_.resize(0, 0);
     std::vector<int> island_of(at(bodies), -1);
     for (int i = 0; i < rows; ++i) {
       if (first[at(i)] < 0) continue;  // nothing moves it, and it moves nothing
@@ -39,8 +40,11 @@ class RowIslands {
       if (const int k = island_of[at(sets.root(b))]; k >= 0)
         for (int j = 0; j < 6; ++j) islands_[at(k)].velocities.push_back(6 * b + j);
   }
-  /// MC: M^-1 C S.
+  /// MC: M^-1 C S. Derivatives by most velocities have the rows and columns of the state.
   void factor(const MatrixXd& R, const MatrixXd& MC, const VectorXd& scale) {
+    if (R_.size() == R.size() && R_ == R && MC_ == MC) return;
+    R_ = R;
+    MC_ = MC;
     for (Island& each : islands_) {
       if (static_cast<Eigen::Index>(each.rows.size()) == R.rows())
         K_.noalias() = scale.asDiagonal() * R * MC;
@@ -69,7 +73,8 @@ class RowIslands {
     linalg::LeastSquares factor;
   };
   std::vector<Island> islands_;
-  MatrixXd K_;  // of one island
+  MatrixXd R_, MC_;  // of the factors
+  MatrixXd K_;       // of one island
 };
 
 }  // namespace tether::scene::event
