@@ -397,6 +397,72 @@ TEST_CASE("the event engine tells what pivots pull with, and redundant ones equa
   }
 }
 
+TEST_CASE("the event engine's forces of contacts and of a joint hold bodies at rest together") {
+  // Two hinged boxes on a slope. The shortest forces leave the cone at a corner, and the lawful
+  // ones that are told in their place go with other forces of the hinge.
+  const std::string text = R"(
+[scene]
+end = 0.1
+gravity = [3, -2, -9.81]
+[event]
+[output]
+forces = true
+[[body]]
+name = "floor"
+shape = "plane"
+normal = [0, 0, 1]
+fixed = true
+material = "floor"
+[[body]]
+name = "left"
+shape = "box"
+size = [1, 1, 1]
+mass = 1
+position = [0, 0, 0.5]
+material = "box"
+[[body]]
+name = "right"
+shape = "box"
+size = [1, 1, 1]
+mass = 9
+position = [1.2, 0, 0.5]
+material = "box"
+[[joint]]
+name = "hinge"
+kind = "hinge"
+bodies = ["left", "right"]
+at = [0.6, 0.3, 0.9]
+axis = [0, 0, 1]
+[[pair]]
+between = ["box", "floor"]
+friction = 0.5
+[[pair]]
+between = ["box", "box"]
+)";
+  for (const Vector3d& axis : {Vector3d(0, 0, 1), Vector3d(0, 1, 0), Vector3d(1, 1, 1)}) {
+    for (const int hinges : {1, 2}) {
+      CAPTURE(axis.transpose(), hinges);
+      Scene s = parse_scene(text, "hinged.toml");
+      s.joints[0].axis = axis.normalized();
+      s.joints.resize(static_cast<std::size_t>(hinges), s.joints[0]);
+      const std::unique_ptr<Engine> engine = make_engine(s);
+      engine->advance(0.05);
+      const Forces f = total_forces(*engine);
+      for (const std::size_t b : {1U, 2U}) {
+        Vector3d force = f.contact[b] + s.bodies[b].mass * *s.gravity, moment = f.contact_moment[b];
+        for (const JointForce& each : f.joints) {
+          const double side = b == 1 ? 1 : -1;
+          force += side * each.force;
+          moment +=
+              side * (each.moment + (each.at - engine->bodies()[b].position).cross(each.force));
+        }
+        CHECK(force.norm() < 1e-6);
+        CHECK(moment.norm() < 1e-6);
+      }
+    }
+  }
+}
+
 TEST_CASE("the event engine tells the impulse of an impact") {
   // Slipping all along: the friction's is mu of the normal one, against the slip.
   const double tolerance = 1e-9, speed = std::sqrt(2 * 9.81 * 0.4), mu = 0.2, e = 0.5, mass = 3;

@@ -252,11 +252,11 @@ class EventEngine : public ResumableEngine {
   }
   Forces forces_of_motion() const {
     event::Motion& motion = driver_->motion();
-    Forces out = model_->forces_of(reactions_, motion.joint_forces());
-    const std::vector<VectorXd> forces = motion.contact_forces();
-    for (std::size_t k = 0; k < forces.size(); ++k)
+    const event::RowForces forces = motion.row_forces();
+    Forces out = model_->forces_of(reactions_, forces.joints);
+    for (std::size_t k = 0; k < forces.contacts.size(); ++k)
       if (const int contact = motion.closed()[k]; model_->is_law(contact))
-        model_->add_law_force(contact, forces[k], out);
+        model_->add_law_force(contact, forces.contacts[k], out);
     smooth::to_si(units_, scene_, out);
     for (JointForce& each : out.joints) to_world(each.at);
     for (SpringForce& each : out.springs) {
@@ -313,7 +313,7 @@ class EventEngine : public ResumableEngine {
     const std::vector<int>& closed = motion.closed();
     if (closed.empty()) return {};
     find_forces();
-    const std::vector<VectorXd> forces = motion.contact_forces();
+    const std::vector<VectorXd> forces = motion.row_forces().contacts;
     std::vector<ContactState> out =
         states_of(closed, units_.force(), [&](std::size_t k) { return forces[k]; });
     auto state = out.begin();

@@ -365,18 +365,6 @@ void Motion::finish_rate(double* y_rate) {
   y_rate[work()] = power;
 }
 
-VectorXd Motion::joint_forces() {
-  const int rows = model_.joint_rows();
-  if (joints_ == rows) return lambda_.head(joints_);
-  model_.joints(joint_W_, joint_rate_, joint_rest_);
-  VectorXd load = VectorXd::Zero(nu_);
-  for (int k = 0; k < joints_; ++k)
-    load += lambda_[k] * joint_W_.row(joints_in_use_[at(k)]).transpose();
-  linalg::LeastSquares factor(kDependentRow);
-  factor.factor(joint_W_.transpose());
-  return factor.solve(load);
-}
-
 std::vector<VectorXd> Motion::slides() const {
   std::vector<VectorXd> out(closed_.size());
   for (std::size_t k = 0; k < closed_.size(); ++k) {
@@ -403,32 +391,52 @@ bool Motion::forces_are_lawful() const {
          left.cwiseAbs().maxCoeff() <= std::max(1e-9, bands_.of_accelerations()) * scale;
 }
 
-std::vector<VectorXd> Motion::contact_forces() {
-  std::vector<VectorXd> out;
-  double largest = 0;
-  bool lawful = true;
+RowForces Motion::row_forces() {
+  RowForces out;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const int contact = static_cast<int>(k);
-    VectorXd& force = out.emplace_back(1 + kTangents);
-    force << normal_force(contact), friction_force(contact);
-    largest = std::max(largest, force.norm());
+    out.contacts.emplace_back(1 + kTangents) << normal_force(contact), friction_force(contact);
   }
+  const VectorXd moved = find_lawful(out.contacts);
+  const int rows = model_.joint_rows();
+  if (rows == 0 || (joints_ == rows && moved.isZero(0))) {
+    out.joints = lambda_.head(joints_);
+    return out;
+  }
+  model_.joints(joint_W_, joint_rate_, joint_rest_);
+  VectorXd load = moved;
+  for (int k = 0; k < joints_; ++k)
+    load += lambda_[k] * joint_W_.row(joints_in_use_[at(k)]).transpose();
+  linalg::LeastSquares factor(kDependentRow);
+  factor.factor(joint_W_.transpose());
+  out.joints = factor.solve(load);
+  return out;
+}
+
+VectorXd Motion::find_lawful(std::vector<VectorXd>& forces) {
+  VectorXd moved = VectorXd::Zero(nu_);
+  double largest = 0;
+  for (const VectorXd& force : forces) largest = std::max(largest, force.norm());
+  bool lawful = true;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
     const double least = -kNoForce * largest, mu = friction(k);
-    lawful =
-        lawful && out[k][0] >= least && mu * out[k][0] - out[k].tail(kTangents).norm() >= least;
+    lawful = lawful && forces[k][0] >= least &&
+             mu * forces[k][0] - forces[k].tail(kTangents).norm() >= least;
   }
-  if (lawful || !is_hyperstatic()) return out;
+  if (lawful || !is_hyperstatic()) return moved;
   ContactRows rows(model_, closed_);
   const AccelerationSolution answer =
       solve_accelerations(rows, slides(), bands_.of_accelerations());
-  if (!answer.contacts.solved) return out;
+  if (!answer.contacts.solved) return moved;
   for (std::size_t k = 0; k < closed_.size(); ++k) {
-    const VectorXd force = rows.of(static_cast<int>(k), answer.contacts.x);
-    const int from = 1 - normals_of(k);  // of the others the normal force is known
-    out[k].tail(1 + kTangents - from) = force.tail(1 + kTangents - from);
+    VectorXd force = rows.of(static_cast<int>(k), answer.contacts.x);
+    if (normals_of(k) == 0) force[0] = forces[k][0];  // it is known
+    const VectorXd less = forces[k] - force;
+    moved += less[0] * kinematics_[k].normal.transpose() +
+             kinematics_[k].tangents.transpose() * less.tail(kTangents);
+    forces[k] = std::move(force);
   }
-  return out;
+  return moved;
 }
 
 VectorXd Motion::friction_force(int closed) const {

@@ -51,6 +51,12 @@ struct ContactMode {
   VectorXd direction;
 };
 
+/// Forces of all rows of joints, and of each closed contact (n, tangents).
+struct RowForces {
+  VectorXd joints;
+  std::vector<VectorXd> contacts;
+};
+
 class Motion {
  public:
   /// Sets the model to (t, q, u), where the bands are taken.
@@ -91,11 +97,9 @@ class Motion {
     return is_bounded(at(closed)) ? bound(at(closed)) : lambda_[normal_row(at(closed))];
   }
   VectorXd friction_force(int closed) const;  ///< by tangents
-  /// Forces of all rows of joints: redundant ones share.
-  VectorXd joint_forces();
-  /// Forces of each closed contact (n, tangents). Contacts that share forces have forces that
-  /// Coulomb's law allows, which the shortest ones may not be.
-  std::vector<VectorXd> contact_forces();
+  /// Those of the last rate(). Redundant rows of joints share. Contacts that share forces have
+  /// forces that Coulomb's law allows, which the shortest ones may not be.
+  RowForces row_forces();
   /// Whether the forces of the last rate() hold all rows, and Coulomb's law allows them.
   bool forces_are_lawful() const;
   /// Directions of the closed contacts that slide; empty where they stick.
@@ -184,6 +188,8 @@ class Motion {
     }
   }
   void prepare(double t, const double* y);
+  /// Makes forces of contacts lawful where they are not; what joints take over, on velocities.
+  VectorXd find_lawful(std::vector<VectorXd>& forces);
   void finish_rate(double* y_rate);
   void gather();
   void values_of_rows(VectorXd& positions, VectorXd& rates);
