@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
-#include <movers/mover.hpp>
+#include <movers/rows_at.hpp>
 #include <problems/andrews.hpp>
 #include <problems/car_axis.hpp>
 #include <problems/pendulum.hpp>
@@ -42,12 +42,12 @@ void measure(const Problem& problem, int batches, int moves) {
   const tp::Constraints constraints = problem.recommended_constraints();
   const tp::Options options;
   tp::Statistics statistics;
-  tp::Mover mover(options,
-                  tp::make_contiguous_rows(constraints, options, statistics, problem.size, false));
+  const std::unique_ptr<tp::RowsAt> rows =
+      tp::make_contiguous_rows(constraints, options, statistics, problem.size, false);
   tp::Candidate candidate{problem.t0, base, correction, weights};
   candidate.with_entries();
   perturb();
-  mover.rows().set_algebraic(candidate, id);
+  rows->set_algebraic(candidate, id, {});
 
   double best = 1e300;
   bool success = true;
@@ -60,7 +60,7 @@ void measure(const Problem& problem, int batches, int moves) {
       // moved, only g would be evaluated.
       constexpr int kRepeat = 16;
       for (int repeat = 0; repeat < kRepeat; ++repeat) {
-        success = mover.move(candidate).status == tp::Status::success && success;
+        success = rows->move(candidate).status == tp::Status::success && success;
         candidate.correction_entries[0] += 0.01 / candidate.weight_entries[0];
       }
       spent +=
