@@ -247,6 +247,17 @@ TEST_CASE("a recoverable failure or NaN at the k-th call of F, g or C costs no r
       }
 }
 
+TEST_CASE("F fails once where its index is sought: rows keep the equations that they need") {
+  const Problem wheel = wheel_on_rail("GGL", true, 0.5);
+  const Case c{"GGL", wheel, wheel.select({"gap", "rate", "energy"}), {}, 0.2};
+  for (long k = 2; k <= 60; ++k) {  // the index is sought by the calls 15 to 26
+    INFO("call " << k);
+    const Outcome end = run(c, Where::F, Fault::recoverable, k);
+    CHECK(end.flag >= 0);
+    CHECK(end.status == tp::Status::success);
+  }
+}
+
 TEST_CASE("make_consistent and project end with the callback that says stop") {
   const Problem problem = pendulum(1.0, 1.0, 3.0, "index 1");
   const auto attempt = [&](Where where, long k) {

@@ -94,6 +94,22 @@ TEST_CASE("a motion that is to be resolved keeps its order: the same bits as wit
   }
 }
 
+TEST_CASE("the order is not limited where differences of y' overflow in tolerances") {
+  for (const int exponent : {0, 520}) {  // the same circle in other units of time
+    const double w = std::ldexp(1.0, exponent);
+    Problem p = ode({1.0, 0.0}, 20.0 / w, [w](double, const double* y, double* f) {
+      f[0] = -w * y[1];
+      f[1] = w * y[0];
+    });
+    p.reference = {std::cos(20.0), std::sin(20.0)};
+    p.initial_step = std::ldexp(1e-4, -exponent);
+    const Run run = integrate(p, 1e-6, on_circle(), {}, false);
+    CHECK(run.statistics.order_limited == 0);
+    CHECK(run.steps < 250);
+    CHECK(run.error < 2e-5);
+  }
+}
+
 TEST_CASE(
     "the limit ends: a second run has the steps of the first, and high orders where they pay") {
   const Problem p = driven_oscillators(6.0, 3e-3);

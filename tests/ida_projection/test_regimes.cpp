@@ -1,6 +1,7 @@
 // Tether: time-dependent constraints, odd weights, roots and stops. SPDX-License-Identifier:
 // BSD-3-Clause
 #include <cmath>
+#include <limits>
 #include <problems/car_axis.hpp>
 #include <problems/governor.hpp>
 #include <problems/nand_gate.hpp>
@@ -288,6 +289,47 @@ TEST_CASE("an energy in voltages that are zero at the start: all charges move wi
       INFO("y[" << i << "] at tolerance " << tolerance << ": " << run.y[i] << ", " << exact[i]);
       CHECK(std::abs(run.y[i] - exact[i]) <= 10.0 * tolerance);
     }
+  }
+}
+
+TEST_CASE("columns of what is held may become infinite: nothing moves along them") {
+  // x falls through 0; lam = u + x^1.5 for x > 0, and the derivative of that is told as infinite
+  // for x < 0.
+  const auto h = [](double x) { return x > 0.0 ? std::pow(x, 1.5) : 0.0; };
+  const auto slope = [](double x) {
+    return x > 0.0 ? 1.5 * std::sqrt(x) : std::numeric_limits<double>::infinity();
+  };
+  Problem p;
+  p.size = 4;
+  p.t_end = 6.0;
+  p.y0 = {2.0, 1.0, 0.0, 1.0 + h(2.0)};
+  p.yp0 = {-1.0, 0.0, 1.0, -slope(2.0)};
+  p.id = {1, 1, 1, 0};
+  p.reference = {-4.0, std::cos(6.0), std::sin(6.0), std::cos(6.0)};
+  p.residual = [h](double, const double* y, const double* yp, double* r) {
+    r[0] = yp[0] + 1.0;
+    r[1] = yp[1] + y[2];
+    r[2] = yp[2] - y[1];
+    r[3] = y[3] - y[1] - h(y[0]);
+  };
+  tp::Constraints rows;
+  rows.names = {"circle", "flow"};
+  rows.count = 2;
+  rows.value = [h](double, tp::ConstVector y, tp::Vector g) {
+    g << (y[1] * y[1] + y[2] * y[2] - 1.0) / 2.0, y[3] - y[1] - h(y[0]);
+    return 0;
+  };
+  rows.jacobian = tp::DenseJacobian([slope](double, tp::ConstVector y, tp::Matrix C) {
+    C << 0.0, y[1], y[2], 0.0, -slope(y[0]), -1.0, 0.0, 1.0;
+    return 0;
+  });
+  tp::Options options;
+  options.hold = {true, false, false, false};
+  for (const bool sparse : {false, true}) {
+    const Run run = integrate(p, 1e-6, sparse ? as_sparse(rows, 4) : rows, options, false);
+    INFO(run.message);
+    CHECK(run.flag >= 0);
+    CHECK(run.error < 1e-4);
   }
 }
 

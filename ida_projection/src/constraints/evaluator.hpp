@@ -113,8 +113,9 @@ Status central_differences(double e, std::vector<double>& slope, std::vector<dou
        {std::pair{1.0, 8.0}, {-1.0, -8.0}, {2.0, -1.0}, {-2.0, 1.0}}) {
     const Status status = at(steps * e, values);
     if (status != Status::success) return status;
-    for (std::size_t i = 0; i < slope.size(); ++i) slope[i] += weight / (12.0 * e) * values[i];
+    for (std::size_t i = 0; i < slope.size(); ++i) slope[i] += weight * values[i];
   }
+  for (double& each : slope) each /= 12.0 * e;
   return Status::success;
 }
 

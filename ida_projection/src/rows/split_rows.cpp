@@ -370,8 +370,15 @@ void SplitRows::solve_blocks(const std::vector<double>& g) {
   if (moves) d.solve();
   if (a.rows.empty()) return;
   if (moves) d.for_columns([this](int k, int j) { moved_[at(j)] = d.dy[at(k)]; });
-  for (std::size_t k = 0; k < a.rows.size(); ++k)
-    a.g[k] = g[at(a.rows[k])] - (moves ? C_.times(a.rows[k], moved_.data()) : 0.0);
+  for (std::size_t k = 0; k < a.rows.size(); ++k) {
+    a.g[k] = g[at(a.rows[k])];
+    if (!moves) continue;
+    double change = 0.0;  // without held columns, where C need not be finite
+    C_.visit(a.rows[k], [&](int j, double c) {
+      if (moved_[at(j)] != 0.0) change += c * moved_[at(j)];
+    });
+    a.g[k] -= change;
+  }
   a.solve();
 }
 

@@ -218,10 +218,10 @@ int AlgebraicVariables::index_above_one(const Candidate& candidate, Corrector& c
 // variables that the matrix leaves free carry rounding divided by the step: they are undetermined.
 AlgebraicVariables::Index AlgebraicVariables::exceeds_one(const Candidate& candidate,
                                                           Corrector& corrector, long usual) {
-  if (candidate.base_entries == nullptr) return Index::low;
+  if (candidate.base_entries == nullptr) return Index::presumed_low;
   const int size = static_cast<int>(N_VGetLength(candidate.base));
   if (size > (usual >= size ? kLargestProbed : kLargestSize))
-    return has_rows_of_zeros(candidate, corrector) ? Index::high : Index::low;
+    return has_rows_of_zeros(candidate, corrector) ? Index::high : Index::presumed_low;
   std::vector<double> change(static_cast<std::size_t>(size));
   for (int j = 0; j < size; ++j) {
     const double w = candidate.weight_entries[j];
@@ -253,7 +253,7 @@ void AlgebraicVariables::find_index(const Candidate& candidate, Corrector& corre
     found_ = Found();
     found_.is = exceeds_one(candidate, corrector, usual);
   }
-  index_ = found_.is == Index::high ? Index::high : Index::low;
+  index_ = found_.is == Index::unknown ? Index::presumed_low : found_.is;
 }
 
 // Coupled ones are not tested where F is of higher index and does not tell which it leaves free.

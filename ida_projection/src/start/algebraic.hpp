@@ -41,10 +41,12 @@ class AlgebraicVariables {
   /// Finds the index of F at the first call; later runs reuse it. `usual`: evaluations of F that a
   /// Jacobian takes in this run, see exceeds_one().
   void find_index(const Candidate& candidate, Corrector& corrector, long usual);
-  void note_index_as_low() { index_ = Index::low; }
+  void note_index_as_low() { index_ = Index::presumed_low; }
   bool index_known() const { return index_ != Index::unknown; }
   /// F is not of index 1 in its own variables.
   bool high_index() const { return index_ == Index::high; }
+  /// It is, as all of its derivatives have shown.
+  bool low_index() const { return index_ == Index::low; }
   /// The index of F if it is 2 or more and could be found, else 0.
   int index() const { return index_known() ? found_.index : 0; }
   /// Algebraic variables of index 2 or more.
@@ -69,7 +71,7 @@ class AlgebraicVariables {
                                               Corrector& corrector) const;
 
  private:
-  enum class Index { unknown, low, high };
+  enum class Index { unknown, presumed_low, low, high };
   struct Found {
     Index is = Index::unknown;  // F could not be evaluated
     int index = 0;

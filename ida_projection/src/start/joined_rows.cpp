@@ -44,7 +44,7 @@ void JoinedRows::join(const Candidate& candidate) {
   const double* id = variables_.mask();
   const JoinedEquations found = find_joined_equations(
       rows, residual, [&] { return variables_.derivative_free_equations(candidate, corrector_); },
-      candidate.t, y, WT, options_.hold, id, variables_.index_known() && !variables_.high_index());
+      candidate.t, y, WT, options_.hold, id, variables_.low_index());
   if (rows.report.fatal) corrector_.stop(-1, rows.report.text);
   repeats_ = found.repeats;
   if (found.moves.empty()) return;

@@ -58,7 +58,8 @@ void OrderLimit::compare_slopes(const Attempt& attempt, const Candidate& candida
 }
 
 void OrderLimit::watch(const Attempt& attempt) {
-  if (now_.samples < kSamples || now_.mean < now_.large || attempt.steps < now_.not_before) return;
+  if (now_.samples < kSamples || !(now_.mean >= now_.large) || attempt.steps < now_.not_before)
+    return;  // also where the mean is no number
   ++now_.limits;
   now_.samples = 0;
   now_.phase = Phase::lowering;
