@@ -14,6 +14,14 @@ done
 for folder in attach constraints host movers rows start step watch; do
   grep -rhoE '^#include "[a-z_]+/' "$1/$folder" | sed 's/.*"//; s#/$##' | sort -u | grep -vx "$folder" | sed "s/^/$folder /"
 done | tsort >/dev/null
+# Programs of benchmarks/, which tests/run.sh does not build, look inside, too.
+for header in $(grep -rhoE '#include [<"](attach|constraints|host|movers|rows|start|step|watch)/[a-z_/]+[.]hpp' \
+  "$1/../../benchmarks" "$1/../../tests" | sed 's/.*[<"]//' | sort -u); do
+  if [ ! -f "$1/$header" ]; then
+    echo "$header is included, but is not there" >&2
+    exit 1
+  fi
+done
 # Which symbols are there shows that names are seen at all.
 names=$(nm -C "$2" | grep -o 'tether::ida_projection::[A-Z][A-Za-z]*' | sort -u)
 echo "$names" | grep -q 'RowsAt$'
