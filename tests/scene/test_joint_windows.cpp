@@ -233,6 +233,40 @@ TEST_CASE("every kind of joint closes as its bodies are, and conserves both mome
     }
 }
 
+TEST_CASE("a joint attaches to the world in events far from the origin as near it") {
+  for (const char* kind :
+       {"\"ball\"", "\"fixed\"", "\"hinge\"\naxis = [0, 1, 1]", "\"slider\"\naxis = [1, 2, 0]"}) {
+    Vector3d found[2];
+    for (const int far : {0, 1}) {
+      const Vector3d place(-30.0 * far, 100.0 * far, 0);
+      Scene s = scene_of(fmt::format(R"(
+[scene]
+end = 0.1
+gravity = [0, 0, -9.81]
+[[body]]
+name = "ball"
+shape = "sphere"
+radius = 0.2
+mass = 1
+position = [{0}, {1}, 0]
+angular_velocity = [1, 2, 3]
+[[joint]]
+name = "late"
+kind = {2}
+bodies = ["ball", "world"]
+at = [{3}, {1}, 0]
+from = 0.05
+)",
+                                     place.x(), place.y(), kind, place.x() + 0.4));
+      const auto engine = engine_of(s, EngineKind::event, 1e-10);
+      engine->advance(0.1);
+      found[far] = engine->bodies()[0].position - place;
+    }
+    INFO(kind);
+    CHECK((found[1] - found[0]).norm() < 1e-8);
+  }
+}
+
 TEST_CASE("a hinge that attaches counts its angle from there, and detaches at its time") {
   const std::string text = passing(
       "kind = \"hinge\"\nat = [0.5, 0, 0]\naxis = [0, 1, 1]\nto = 0.6\n"

@@ -17,7 +17,8 @@ import verify  # noqa: E402
 from verify import V, rotation  # noqa: E402
 
 SCENES = {"rolling_sphere": 0.02, "icy_wedge": 0.01, "stack": 0.02, "cart": 0.002, "gripper": 0.004, "pulled_block": 0.04, "bricard": 0.1,
-          "clearance": 0.0004, "hanging_frame": 0.5, "rocking_block": 2.0, "capstan": 0.02, "stick_slip": 0.3}
+          "clearance": 0.0004, "hanging_frame": 0.5, "rocking_block": 2.0, "capstan": 0.02, "stick_slip": 0.3,
+          "../../tests/scene/joined_turn": 0.02}
 PART = 1e-3  # of a number: what a small fault changes
 
 

@@ -80,7 +80,11 @@ inline Scene seen_from(const Eigen::Vector3d& origin, Scene scene) {
   for (Joint& joint : scene.joints) {
     joint.at -= origin;
     joint.at_second -= origin;
-    if (joint.closed) joint.closed->position -= origin;
+    if (joint.closed) {
+      joint.closed->position -= origin;
+      // The frame of the world has moved with the origin.
+      if (joint.second < 0) joint.closed->position += joint.closed->orientation * origin;
+    }
   }
   if (scene.start)
     for (BodyState& body : scene.start->bodies) body.position -= origin;
