@@ -147,10 +147,12 @@ class StepScribe final : public certificate::Source {
     std::string inside = pushes_;
     const bool composed = contacts_.impulses != first_impulses_;
     const double residual = put_contacts(inside, contacts_, as_solved_, solved_);
-    std::vector<double> pulls = stepper_.joint_impulses();
-    for (std::size_t row = 0; row < pulls.size(); ++row)
-      pulls[row] -= stage.joint_impulses_at_end[row];  // these are told at the end
-    if (hold(now_)) put_pulls(inside, begin_, stage.start, pulls);
+    if (hold(now_)) {
+      std::vector<double> pulls = stepper_.joint_impulses();
+      for (std::size_t row = 0; row < pulls.size(); ++row)
+        pulls[row] -= stage.joint_impulses_at_end[row];  // these are told at the end
+      put_pulls(inside, begin_, stage.start, pulls);
+    }
     put_laws(inside, stage.start, stage.length);
     Part part;
     part.start = stage.start;
